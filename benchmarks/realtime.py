@@ -29,8 +29,8 @@ from rigtwin.hardware.daq.wired import InRealTime, WiredTwin
 from rigtwin.hardware.realtime import Pacer, in_real_time
 from rigtwin.hardware.session.record import (
     open_virtual_card,
-    record_at_leisure,
     record_in_real_time,
+    record_unpaced,
 )
 from rigtwin.hardware.session.test import Test
 from rigtwin.numerics.arrays import Array
@@ -140,7 +140,7 @@ def compute(name: str, folder: Path, paced: bool, seconds: float = SECONDS) -> A
     test = _test(name, seconds)
     tape = _Taped(test.terminals())
     card, _ = open_virtual_card(test, tape)
-    record_at_leisure(card, test, folder / "tape.mcap")
+    record_unpaced(card, test, folder / "tape.mcap")
     tape.rewind()
     card, device = open_virtual_card(test, tape)
     timed = _Timed(card, device, Pacer(test.configuration.timing.period) if paced else None)

@@ -22,7 +22,7 @@ from rigtwin.components import RigPlant
 from rigtwin.description.configuration import Configuration
 from rigtwin.numerics.arrays import Array
 from rigtwin.simulation.ideal import simulate_ideal
-from rigtwin.studies.stability.tested import rig_as, set_for_compensation, sized
+from rigtwin.studies.stability.tested import configure_vehicle, set_for_compensation, sized
 
 TESTS = ("drop", "road1.6", "road10")
 SECONDS, SEED = 10.0, 1
@@ -73,7 +73,7 @@ def configure(vehicle: str, test: str) -> Configuration:
     """Return the configuration of a vehicle in a test, on a rig with a strong enough motor."""
     base = find(test).configuration
     timing = base.timing._replace(duration=SECONDS)
-    return sized(rig_as(find_vehicle(vehicle)))._replace(road=base.road, timing=timing)
+    return sized(configure_vehicle(find_vehicle(vehicle)))._replace(road=base.road, timing=timing)
 
 
 def run(configuration: Configuration, test: str, compensated: bool) -> Errors:

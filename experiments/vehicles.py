@@ -19,7 +19,7 @@ from rigtwin.components import Carriage, Tyre
 from rigtwin.description.configuration import Configuration
 from rigtwin.errors import RigtwinError
 from rigtwin.simulation.experiment import Experiment
-from rigtwin.studies.stability.tested import rig_as, set_for_compensation
+from rigtwin.studies.stability.tested import configure_vehicle, set_for_compensation
 from rigtwin.studies.stability.vehicle import QuarterCar
 
 TABLE_6_2 = "quarter-car"
@@ -62,7 +62,7 @@ def configuration(vehicle: Vehicle) -> Configuration:
 
     At the start the spring carries 90 % of the static load, so the body drops.
     """
-    return rig_as(QuarterCar(tyre_damping=0.0, **vehicle._asdict()))
+    return configure_vehicle(QuarterCar(tyre_damping=0.0, **vehicle._asdict()))
 
 
 COMPENSATED = "-compensated"

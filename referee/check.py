@@ -13,7 +13,7 @@ from tempfile import TemporaryDirectory
 from typing import IO, Any
 
 from rigtwin.errors import RigtwinError
-from rigtwin.interruptions import held_back
+from rigtwin.interruptions import block_sigint
 from rigtwin.studies.sweep import Store, Workers, iterate_results, run_jobs
 
 Files = Sequence[bytes]
@@ -90,7 +90,7 @@ def check(
     recordings.mkdir(parents=True, exist_ok=True)
     command = [sys.executable, "-m", "referee.referee", str(recordings), str(cases), str(seed)]
     # Block SIGINT while the referee starts: Ctrl-C would end it in its imports.
-    with held_back():
+    with block_sigint():
         started = subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
         )

@@ -25,7 +25,7 @@ from rigtwin.console import table
 from rigtwin.description.posterior import Posterior, load_posterior
 from rigtwin.studies.sweep import run_jobs
 from rigtwin.studies.tuning.bench import Bench
-from rigtwin.studies.tuning.evaluation import Comparison, compare
+from rigtwin.studies.tuning.evaluation import SettingsComparison, compare
 from rigtwin.studies.tuning.result import BEFORE, TUNED_NOMINAL, find_settings
 from rigtwin.studies.tuning.run import Run, figures
 from rigtwin.studies.tuning.scenario import APART, NOMINAL, Scenario, calibrated_rig
@@ -48,7 +48,7 @@ class TuningCase:
         Number of the rig, from 0.
     defect, sentence : str
         Withheld defect, and the sentence of the diagnosis.
-    against_nominal, against_before : Comparison
+    against_nominal, against_before : SettingsComparison
         Settings tuned on the calibrated twin, compared on the rig with those tuned on the nominal
         twin, and with the baseline.
     """
@@ -56,8 +56,8 @@ class TuningCase:
     number: int
     defect: str
     sentence: str
-    against_nominal: Comparison
-    against_before: Comparison
+    against_nominal: SettingsComparison
+    against_before: SettingsComparison
 
 
 @dataclass(frozen=True)
@@ -234,8 +234,8 @@ def text(study: Study, cases: list[TuningCase]) -> str:
             summary = f"trips on nominal / calibrated / before: {' / '.join(map(percent, trips))}"
             rows.append((name, case.defect, summary, "", "", "", ""))
             continue
-        change_on_rig = case.against_nominal.of(objective.name)
-        change_from_baseline = case.against_before.of(objective.name)
+        change_on_rig = case.against_nominal.change_of(objective.name)
+        change_from_baseline = case.against_before.change_of(objective.name)
         better, worse = better + change_on_rig.improved, worse + (change_on_rig.low > 0.0)
         spreads, unit = (change_on_rig.before, change_on_rig.after), objective.unit
         medians = [f"{number_text(spread.median)} {unit}" for spread in spreads]
@@ -252,10 +252,10 @@ def document(study: Study, cases: list[TuningCase]) -> list[dict[str, object]]:
     """Return all cases as a JSON document."""
     name = study.goals.minimise[0].name
 
-    def describe(comparison: Comparison) -> dict[str, object] | None:
+    def describe(comparison: SettingsComparison) -> dict[str, object] | None:
         if not comparison.changes:
             return None
-        return asdict(replace(comparison.of(name), measure=None))  # type: ignore[arg-type]
+        return asdict(replace(comparison.change_of(name), measure=None))  # type: ignore[arg-type]
 
     return [
         {

@@ -1,4 +1,4 @@
-"""The digital twin of a test rig, and the tool that says why the twin and the rig disagree.
+"""Digital twin of test rigs, and the tool that says why the twin and the machine disagree.
 
     import rigtwin
 
@@ -7,7 +7,7 @@
     answer = rigtwin.diagnose(recording)
     answer.report("why.html")
 
-Names are loaded when they are first used, so that importing it costs nothing.
+Names are loaded on first use, so that `import rigtwin` takes no time.
 """
 
 from __future__ import annotations

@@ -1,5 +1,4 @@
-"""What all commands share: settings from the command line, outputs that are no inputs, tables,
-JSON."""
+"""Helpers shared by all commands: settings, checks of outputs, tables, and JSON."""
 
 from __future__ import annotations
 
@@ -13,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rigtwin.errors import RigtwinError
-from rigtwin.files import require_path, write_whole
+from rigtwin.files import atomic_write, require_path
 
 if TYPE_CHECKING:
     from rigtwin.description.configuration import Configuration
@@ -21,6 +20,7 @@ if TYPE_CHECKING:
 
 
 def configured(configuration: Configuration, parsed: Namespace) -> Configuration:
+    """Return a configuration with the changes of `--config` and `--set`, in that order."""
     from rigtwin.description.changes import from_assignments, from_toml
 
     if parsed.config is not None:
@@ -29,15 +29,14 @@ def configured(configuration: Configuration, parsed: Namespace) -> Configuration
 
 
 def assigned_settings(texts: Sequence[str]) -> list[dict[str, dict[str, str]]]:
-    """The changes of `--set`. Raises RigtwinError for what is none."""
+    """Return the changes of `--set`. Raise RigtwinError for a text that is no assignment."""
     from rigtwin.description.changes import parse_assignments
 
     return list(parse_assignments(texts))
 
 
 def writable(out: Path) -> None:
-    """Raises RigtwinError if a file cannot be written there, before the work that it is to hold is
-    done."""
+    """Raise RigtwinError if a file cannot be written, before the work for it is done."""
     require_path(out)
     if not out.name:
         raise RigtwinError("an output without a name; expected a file")
@@ -50,12 +49,13 @@ def writable(out: Path) -> None:
 
 
 def tell_notes(recording: Recording) -> None:
-    """What is the matter with a recording, on standard error."""
+    """Print the notes of a recording on standard error."""
     for note in recording.notes:
         print(f"note: {recording.path}: {note}", file=sys.stderr)
 
 
 def table(rows: list[tuple[str, ...]]) -> str:
+    """Return rows as text with aligned columns."""
     widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
     return "\n".join(
         "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
@@ -64,7 +64,7 @@ def table(rows: list[tuple[str, ...]]) -> str:
 
 
 def late(figures: Mapping[str, str]) -> str:
-    """What a recording says of the lateness of a loop in real time."""
+    """Return the lateness of a recorded loop in real time, in words."""
     try:
         times = [
             f"{1e6 * float(figures.get(f'late_{figure}', 'nan')):.3g} us"
@@ -80,7 +80,8 @@ def late(figures: Mapping[str, str]) -> str:
 
 
 def finite(document: object) -> object:
-    """The document with null for what is not a finite number, which JSON does not have."""
+    """Return a document with null in place of numbers that are not finite, which JSON lacks."""
+    # Recursion covers documents of nested tables and lists.
     if isinstance(document, float):
         return document if math.isfinite(document) else None
     if isinstance(document, dict):
@@ -91,5 +92,5 @@ def finite(document: object) -> object:
 
 
 def write_json(path: Path, document: object) -> None:
-    """Raises RigtwinError if it cannot be written."""
-    write_whole(path, json.dumps(finite(document), indent=1, allow_nan=False) + "\n")
+    """Write a document as JSON. Raise RigtwinError if the file cannot be written."""
+    atomic_write(path, json.dumps(finite(document), indent=1, allow_nan=False) + "\n")

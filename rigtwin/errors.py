@@ -1,8 +1,10 @@
-"""The one exception users see: a single clear line."""
+"""The one exception that users see."""
 
 from __future__ import annotations
 
 
 class RigtwinError(Exception):
-    """Bad input of any sort. The message says in one line what is wrong, where, and what was
-    expected."""
+    """Invalid input of any kind.
+
+    The message says in one line what is wrong, where, and what was expected.
+    """

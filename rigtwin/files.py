@@ -1,4 +1,4 @@
-"""Files: written whole or not at all; TOML as its standard has it."""
+"""Files: atomic writing, checks of paths, and TOML."""
 
 from __future__ import annotations
 
@@ -13,127 +13,136 @@ from uuid import uuid4
 from rigtwin.errors import RigtwinError
 
 LONGEST = 100
-"""Characters of a name that its half-written copy keeps."""
+"""Number of characters of a file's name that its temporary copy keeps."""
 INTEGER = 64
-"""Bits of an integer in TOML."""
+"""Size of an integer in TOML, in bits."""
 
 
-def write_whole(path: Path, content: str | bytes) -> None:
-    """Writes a file that stays as it was, or away, if that fails half-way.
+def atomic_write(path: Path, content: str | bytes) -> None:
+    """Write a file completely, or leave it as it was.
 
     Parameters
     ----------
     path
-        Where to. What is no plain file, such as /dev/stdout, is written to directly.
+        Path of the file. A device such as /dev/stdout is written to directly.
     content
-        Its bytes, or its text, which becomes UTF-8; what is none, such as the name of a file in
-        another encoding, becomes question marks.
+        Bytes, or text to be encoded as UTF-8. Characters that cannot be encoded, as in file names
+        of another encoding, become question marks.
 
     Raises
     ------
     RigtwinError
-        If it cannot be written.
+        If the file cannot be written.
     """
     data = content.encode("utf-8", "replace") if isinstance(content, str) else content
     try:
-        with written_whole(path) as beside:
+        with atomic_path(path) as beside:
             beside.write_bytes(data)
     except OSError as error:
         raise RigtwinError(f"cannot write {path}: {error.strerror}") from None
 
 
 @contextmanager
-def written_whole(path: Path) -> Iterator[Path]:
-    """A file beside another, whose place it takes once it is written; it goes if that fails.
+def atomic_path(path: Path) -> Iterator[Path]:
+    """Provide a temporary path that replaces a file after success, and is deleted after failure.
 
     Parameters
     ----------
     path
-        Where to. What is no plain file, such as /dev/stdout, is given itself.
+        Path of the file. For a device such as /dev/stdout the path itself is provided.
 
     Yields
     ------
     Path
-        Where to write.
+        Path to write to.
     """
+    # Links are resolved, so that the file they point to is replaced and not the link.
     target = path.resolve()
     if target.exists() and not target.is_file():
         yield target
         return
+    # In the same folder, because a rename is atomic only within one file system.
     beside = target.with_name(f"{target.name[:LONGEST]}.{uuid4().hex[:8]}.part")
     try:
         yield beside
         if target.exists():
+            # The new file keeps the old one's permissions.
             shutil.copymode(target, beside)
         beside.replace(target)
     except BaseException as error:
         with suppress(OSError):
             beside.unlink()
         if isinstance(error, RigtwinError):
-            # The operator knows the file by its name.
+            # The user knows the file by its own name, not by the temporary one.
             raise RigtwinError(str(error).replace(str(beside), str(path))) from None
         raise
 
 
-def keep_apart(out: str | Path, *inputs: Path) -> Path:
-    """A file to be written that is none of those that are read.
+def forbid_overwriting(out: str | Path, *inputs: Path) -> Path:
+    """Return the path of an output unless it is one of the inputs.
 
     Parameters
     ----------
     out
-        Where to.
+        Path of the output.
     inputs
-        What the work is made of; what is not there counts for nothing.
+        Paths of the inputs, which need not exist.
 
     Returns
     -------
     Path
-        The output's.
+        Path of the output.
 
     Raises
     ------
     RigtwinError
-        If it is one of the inputs, which would be lost.
+        If the output is one of the inputs, which would be lost.
     """
     path = Path(out)
-    if path.exists() and any(each.exists() and path.samefile(each) for each in inputs):
+    # samefile also recognises links and other spellings of a path.
+    if path.exists() and any(other.exists() and path.samefile(other) for other in inputs):
         raise RigtwinError(f"{path} is the input; name another output")
     return path
 
 
 def require_path(path: Path) -> None:
-    """Raises RigtwinError for what no file can be called."""
+    """Raise RigtwinError for a text that cannot be a file name."""
     if "\0" in str(path):
-        raise RigtwinError(f"{str(path)!r:.60} is no name of a file: it has a zero byte")
+        raise RigtwinError(f"{str(path)!r:.60} cannot be a file name: it has a zero byte")
 
 
 def recordable(out: str | Path) -> Path:
-    """A file that a recording can be written to and read from again. Raises RigtwinError for a
-    device or a pipe, before a test runs for nothing."""
+    """Return a path to which a recording can be written and from which it can be read.
+
+    Raises RigtwinError for a device or a pipe, before a test runs in vain.
+    """
     path = Path(out)
     require_path(path)
     if path.exists() and not path.is_file():
-        what = "a folder" if path.is_dir() else "no file but a device or a pipe"
-        raise RigtwinError(f"cannot record to {path}: it is {what}")
+        kind = "a folder" if path.is_dir() else "no file but a device or a pipe"
+        raise RigtwinError(f"cannot record to {path}: it is {kind}")
     return path
 
 
 def parse_toml(text: str) -> dict[str, Any]:
-    """The tables of a TOML. Raises ValueError if it is none; integers have 64 bits there, and
-    Python cannot even print those of thousands of digits."""
+    """Return the tables of a TOML text. Raise ValueError if it is not TOML.
+
+    TOML's integers have 64 bits. Python parses longer ones, but cannot print thousands of digits.
+    """
     document = tomllib.loads(text)
+    # A loop instead of recursion: nesting may be deeper than Python's stack.
     waiting: list[object] = [document]
     while waiting:
-        each = waiting.pop()
-        if isinstance(each, dict):
-            waiting += each.values()
-        elif isinstance(each, list):
-            waiting += each
-        elif isinstance(each, int) and each.bit_length() > INTEGER:
-            raise ValueError(f"an integer of {each.bit_length()} bits; expected {INTEGER} at most")
+        value = waiting.pop()
+        if isinstance(value, dict):
+            waiting += value.values()
+        elif isinstance(value, list):
+            waiting += value
+        elif isinstance(value, int) and value.bit_length() > INTEGER:
+            raise ValueError(f"an integer of {value.bit_length()} bits; expected {INTEGER} at most")
     return document
 
 
 def printable(text: str) -> str:
-    """A text of another program in one line, without what would command a terminal."""
-    return "".join(each if each.isprintable() else "?" for each in text)
+    """Return a foreign text in one line, without characters that could control a terminal."""
+    return "".join(char if char.isprintable() else "?" for char in text)

@@ -1,4 +1,4 @@
-"""Ctrl-C, which reaches every process of a terminal at once."""
+"""Ctrl-C: a signal that reaches every process of a terminal at once."""
 
 from __future__ import annotations
 
@@ -11,9 +11,13 @@ from rigtwin.system import no_interrupts
 
 
 @contextmanager
-def deferred() -> Iterator[None]:
-    """Lets an interruption come behind what runs here, not within: a compiled function that is
-    handed its arguments loses one, and says that something of them is missing."""
+def defer_sigint() -> Iterator[None]:
+    """Defer an interruption to the end of this context.
+
+    A compiled function that is interrupted while it receives its arguments loses one of them, and
+    reports that part of it as missing.
+    """
+    # Python handles signals in the main thread only.
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -28,9 +32,13 @@ def deferred() -> Iterator[None]:
 
 
 @contextmanager
-def held_back() -> Iterator[None]:
-    """Keeps interruptions back. A process that is started meanwhile never gets one, not even while
-    it imports its packages; this one gets it behind."""
-    # What is kept back is a thread's own: another thread may take it, and the first one handles it.
-    with deferred(), no_interrupts():
+def block_sigint() -> Iterator[None]:
+    """Block interruptions in this context.
+
+    A process started inside never receives one, not even while it imports its packages. This
+    process receives it at the end.
+    """
+    # A signal mask belongs to one thread. Another thread may take the signal and pass it to the
+    # main thread, whose handler must therefore be deferred too.
+    with defer_sigint(), no_interrupts():
         yield

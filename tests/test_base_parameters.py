@@ -56,8 +56,8 @@ def test_what_keeps_every_sum_changes_no_force(tmp_path):
     joints = [f"joint_{n}" for n in range(4)]
     bodies = RigidBodies(machine.model, joints, (), ())
     motion = np.random.default_rng(1).standard_normal((3, 4, 50))
-    own = [bodies.regressor(motion, f"link_{n}") for n in range(4)]
-    parts = [np.tensordot(change[10 * n : 10 * n + 10], own[n], 1) for n in range(4)]
+    regressors = [bodies.regressor(motion, f"link_{n}") for n in range(4)]
+    parts = [np.tensordot(change[10 * n : 10 * n + 10], regressors[n], 1) for n in range(4)]
     size = max(float(np.max(np.abs(part))) for part in parts)
     assert size > 0.1
     assert float(np.max(np.abs(sum(parts)))) < 1e-6 * size

@@ -388,17 +388,17 @@ def test_through_a_socket_it_is_the_same_card():
             for card in (far, near):
                 card.power(True)
                 card.write(Commands(0.0, -1e-5 * tick, 0.0, 0.01 * tick))
-        with pytest.raises(RigtwinError, match="taken"):
+        with pytest.raises(RigtwinError, match="in use"):
             serve(device, port)
         # The owner dies without a word: its tasks are left, and are freed by name.
         with pytest.raises(CardFault, match="rigtwin card release"):
             Card(TABLE, PERIOD, connect(f"{LOCAL}:{port}")).start()
         assert device.outputs[0] > 0.9
-        there = replace(TABLE, address=f"{LOCAL}:{port}")
-        assert release(there)
+        table = replace(TABLE, address=f"{LOCAL}:{port}")
+        assert release(table)
         assert not device.power
         assert device.outputs[0] == 0.0
-        assert not release(there)
+        assert not release(table)
         Card(TABLE, PERIOD, connect(f"{LOCAL}:{port}")).start()
     finally:
         server.stop(0.0).wait()
@@ -475,8 +475,8 @@ def test_more_samples_than_the_buffer_holds_are_refused():
 
 def test_a_port_that_is_taken_at_one_address_is_taken():
     device = VirtualCard(Terminals(Configuration(), TABLE, 5), TABLE, OnDemand())
-    with socket.socket() as other:
-        other.bind(("127.0.0.1", 0))
-        other.listen()
-        with pytest.raises(RigtwinError, match="is taken"):
-            serve(device, other.getsockname()[1])
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        with pytest.raises(RigtwinError, match="is in use"):
+            serve(device, taken.getsockname()[1])

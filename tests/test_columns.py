@@ -24,9 +24,9 @@ def columns(data: list[bytes]) -> dict[str, list[float]]:
 
 def one_by_one(data: list[bytes]) -> str:
     """What is said of the first message that is no object; nothing if all are."""
-    for number, each in enumerate(data):
+    for number, message in enumerate(data):
         try:
-            if isinstance(json.loads(each), dict):
+            if isinstance(json.loads(message), dict):
                 continue
         except ValueError:
             pass
@@ -36,8 +36,8 @@ def one_by_one(data: list[bytes]) -> str:
 
 def test_columns_are_the_numbers_of_the_messages() -> None:
     rows = [{"a": n, "b": 0.1 * n, "word": "x"} for n in range(50)]
-    found = columns([json.dumps(row).encode() for row in rows])
-    assert found == {"a": [row["a"] for row in rows], "b": [row["b"] for row in rows]}
+    decoded = columns([json.dumps(row).encode() for row in rows])
+    assert decoded == {"a": [row["a"] for row in rows], "b": [row["b"] for row in rows]}
 
 
 @pytest.mark.parametrize(

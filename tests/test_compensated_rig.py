@@ -32,7 +32,11 @@ from rigtwin.diagnosis.controller import ControllerReplay
 from rigtwin.errors import RigtwinError
 from rigtwin.simulation.loop import run, run_compiled
 from rigtwin.simulation.twin import Twin
-from rigtwin.studies.stability.compensated import tell_plate, with_cylinder_delay, with_filters
+from rigtwin.studies.stability.compensated import (
+    with_cylinder_delay,
+    with_exact_plate,
+    with_filters,
+)
 from rigtwin.studies.stability.sampled_loop import decay
 
 PERIOD, FAST, LATE = 1e-3, 2e-3, 8e-3
@@ -85,7 +89,7 @@ def test_what_a_controller_is_told_is_the_cylinder_as_it_is():
     plant = configuration(VEHICLES["truck"]).plant
     cylinder = plant.structure_cylinder._replace(gain=1.1, lag=0.002, delay=0.003, a3=170.0)
     plant = plant._replace(structure_cylinder=cylinder, computer=Computer(delay=0.002))
-    found = cylinder_model(tell_plate(Configuration(plant=plant)).controller)
+    found = cylinder_model(with_exact_plate(Configuration(plant=plant)).controller)
     assert found == closed_loop(cylinder)._replace(delay=0.005)
 
 
@@ -135,11 +139,11 @@ def test_a_look_that_is_thrown_away_changes_nothing():
 def test_an_imposed_test_has_no_model_whose_plate_could_be_late():
     test = find("imposed").configuration
     demands = find("imposed").demands(test, 1)[:400]
-    plain, other = (
+    plain, repeated = (
         next(run_compiled(Twin(each, 0.0, 1), each, demands, block=400)).commands
         for each in (test, compensated(test))
     )
-    assert np.array_equal(plain, other)
+    assert np.array_equal(plain, repeated)
 
 
 def test_a_cylinder_without_an_inverse_is_named():
@@ -174,10 +178,10 @@ def test_what_was_told_wrong_of_the_delay_is_found_in_the_commands(tmp_path):
             Configuration(), {"controller": {**ran.controller, "plate_delay": 0.0}}
         ).controller,
     )
-    found = replay.deviation()
-    assert found is not None
-    assert (found.kind, found.name) == ("setting", "plate_delay")
-    assert found.used == pytest.approx(0.004, rel=1e-3)
+    deviation = replay.deviation()
+    assert deviation is not None
+    assert (deviation.kind, deviation.name) == ("setting", "plate_delay")
+    assert deviation.used == pytest.approx(0.004, rel=1e-3)
 
 
 def test_a_corrected_twin_tells_the_controller(tmp_path):
@@ -191,15 +195,15 @@ def test_a_corrected_twin_tells_the_controller(tmp_path):
     )
     twin = tmp_path / "twin.toml"
     rigtwin.diagnose(late).save_twin(twin)
-    found = from_toml(Configuration(), twin)
-    assert found.plant.structure_cylinder.delay == pytest.approx(LATE, rel=0.05)
-    assert found.controller.plate_delay == found.plant.structure_cylinder.delay
+    configuration = from_toml(Configuration(), twin)
+    assert configuration.plant.structure_cylinder.delay == pytest.approx(LATE, rel=0.05)
+    assert configuration.controller.plate_delay == configuration.plant.structure_cylinder.delay
     # What the controller is told is of tests to come: the recording's own stays.
     assert rigtwin.compare(late, settings=twin)
     assert rigtwin.diagnose(late, settings=twin).verdict == "no gap"
-    one = rigtwin.diagnose_each([late.path], tmp_path / "each", settings=twin, workers=1)[0]
-    assert one.document is not None
-    assert one.document["verdict"] == "no gap"
+    answer = rigtwin.diagnose_each([late.path], tmp_path / "each", settings=twin, workers=1)[0]
+    assert answer.document is not None
+    assert answer.document["verdict"] == "no gap"
 
 
 @pytest.mark.parametrize("name", ["forward-prediction", "lag"])
@@ -216,14 +220,14 @@ def test_a_test_that_is_refused_leaves_the_recording_that_was_there(tmp_path):
     rigtwin.run("suspension-rig", "drop", settings=settings, path=path)
     before = path.read_bytes()
     for kind in ("kalman-inverse", "forward-prediction"):
-        cylinder_model = {"plate_compensator": kind, "plate_a3": 0.0, "plate_b1": 1e8}
-        wrong = {**settings, "controller": cylinder_model}
+        unstable = {"plate_compensator": kind, "plate_a3": 0.0, "plate_b1": 1e8}
+        wrong = {**settings, "controller": unstable}
         with pytest.raises(RigtwinError, match="plate_"):
             rigtwin.run("suspension-rig", "drop", settings=wrong, path=path)
         with pytest.raises(RigtwinError, match="plate_"):
             rigtwin.run_on_twin("drop", settings=wrong, path=path)
         with pytest.raises(RigtwinError, match="plate_"):
-            rigtwin.faults(each=1, processes=0, settings={"controller": cylinder_model})
+            rigtwin.faults(each=1, processes=0, settings={"controller": unstable})
     assert path.read_bytes() == before
 
 

@@ -84,19 +84,19 @@ def test_an_agent_that_commands_what_the_controller_did_meets_the_same_rig():
 def test_each_episode_has_a_road_of_its_own_and_the_same_seed_the_same():
     def totals(seed: int) -> list[float]:
         env = made("active", seed=seed, interval=50)
-        found = []
+        steps = []
         for _ in range(2):
             step, total = env.reset(), 0.0
             while not step.last():
                 step = env.step(env.rest())
                 total += step.reward
-            found.append(total)
-        return found
+            steps.append(total)
+        return steps
 
-    one, again, next_one = totals(0), totals(0), totals(1)
-    assert one == again
-    assert one[0] != one[1]
-    assert one[1] == next_one[0]
+    first, again, next_one = totals(0), totals(0), totals(1)
+    assert first == again
+    assert first[0] != first[1]
+    assert first[1] == next_one[0]
 
 
 def test_a_trip_ends_an_episode_for_good():
@@ -136,12 +136,12 @@ def test_an_agent_can_do_something_about_it():
         env = Environment(
             short("passive", 3.0), find("passive").demands, reward=Reward(travel=np.inf)
         )
-        step, found = env.reset(), 0.0
+        step, reward = env.reset(), 0.0
         while not step.last():
             velocity = step.observation["controller"][4]
             step = env.step(np.array([50.0, np.clip(200.0 - gain * velocity, 100.0, 300.0)]))
-            found += step.reward
-        return found
+            reward += step.reward
+        return reward
 
     assert total(300.0) > total(0.0)
 
@@ -201,14 +201,14 @@ def test_the_viewer_runs_it_and_pauses_change_nothing(name):
         runtime.tick(0.02, paused)
     assert runtime.state == State.STOPPED
     assert runtime.get_time() == pytest.approx(0.5)
-    other = Environment(configuration, find(name).demands, seed=5)
-    step = other.reset()
+    different = Environment(configuration, find(name).demands, seed=5)
+    step = different.reset()
     for observation, position in seen:
         assert all(
             np.array_equal(observation[kind], step.observation[kind]) for kind in observation
         )
-        assert np.array_equal(position, other.physics.data.qpos)
-        step = other.step(other.rest())
+        assert np.array_equal(position, different.physics.data.qpos)
+        step = different.step(different.rest())
     assert step.last()
     runtime.restart()
     runtime.tick(0.02, paused=False)

@@ -32,11 +32,13 @@ def test_road_amplitudes_follow_equation_6_3():
 
 def test_road_starts_at_rest_and_repeats_with_its_seed():
     road = Road()
-    one, same, other = (road_profile(road, TIME, np.random.default_rng(seed)) for seed in (1, 1, 2))
-    assert one[0] == 0.0
-    assert abs(one[1] - one[0]) < 1e-6
-    assert np.array_equal(one, same)
-    assert not np.array_equal(one, other)
+    first, repeated, different = (
+        road_profile(road, TIME, np.random.default_rng(seed)) for seed in (1, 1, 2)
+    )
+    assert first[0] == 0.0
+    assert abs(first[1] - first[0]) < 1e-6
+    assert np.array_equal(first, repeated)
+    assert not np.array_equal(first, different)
     with pytest.raises(RigtwinError, match="below"):
         road_spectrum(Road(lowest=2.0, highest=1.0))
 

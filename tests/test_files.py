@@ -15,7 +15,7 @@ from scipy.io import loadmat
 import rigtwin
 from rigtwin.cli import main
 from rigtwin.errors import RigtwinError
-from rigtwin.files import printable, write_whole
+from rigtwin.files import atomic_write, printable
 from rigtwin.recording import Writer, load
 from rigtwin.recording.export import export
 from rigtwin.recording.schema import END_RECORD
@@ -33,14 +33,14 @@ def recording_of(path: Path, values: np.ndarray, names: list[str], machine: str 
 
 def test_a_file_that_cannot_be_finished_stays_as_it_was(tmp_path, monkeypatch):
     path = tmp_path / "a.html"
-    write_whole(path, "before")
+    atomic_write(path, "before")
 
     def full(_: Path, __: bytes) -> None:
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(Path, "write_bytes", full)
     with pytest.raises(RigtwinError, match=r"cannot write .*a\.html: No space left on device"):
-        write_whole(path, "after")
+        atomic_write(path, "after")
     assert path.read_text() == "before"
     assert list(tmp_path.iterdir()) == [path]
 
@@ -48,12 +48,12 @@ def test_a_file_that_cannot_be_finished_stays_as_it_was(tmp_path, monkeypatch):
 def test_links_and_devices_stay_what_they_are(tmp_path):
     link, path = tmp_path / "link", tmp_path / "file"
     link.symlink_to(path)
-    write_whole(link, "through")
+    atomic_write(link, "through")
     assert link.is_symlink()
     assert path.read_text() == "through"
-    write_whole(Path(os.devnull), "nowhere")
+    atomic_write(Path(os.devnull), "nowhere")
     assert not Path(os.devnull).is_file()
-    write_whole(path, "name \udcff")
+    atomic_write(path, "name \udcff")
     assert path.read_text() == "name ?"
 
 
@@ -101,8 +101,8 @@ def test_pictures_of_odd_recordings(tmp_path):
     line, gap = np.arange(5.0), np.array([0.0, 1.0, 2.0, 7.0, 8.0])
     assert np.isnan(_part(gap, line, 1.0)[1]).tolist() == [False] * 3 + [True] + [False] * 2
     assert _part(line, line, 1.0)[0].tolist() == line.tolist()
-    many = recording_of(tmp_path / "m.mcap", np.ones((300, 25)), [f"c{n}" for n in range(25)])
-    draw(many, tmp_path / "m.svg")
+    wide = recording_of(tmp_path / "m.mcap", np.ones((300, 25)), [f"c{n}" for n in range(25)])
+    draw(wide, tmp_path / "m.svg")
     assert (tmp_path / "m.svg").stat().st_size > 0
 
 

@@ -50,10 +50,10 @@ def cart(folder: Path) -> rigtwin.Machine:
 
 def test_two_zeros_and_a_gain_that_scales_all_there_is():
     can = rigtwin.identifiability(rigtwin.machine("damper-bench"))
-    assert can.alike["offset@damper"] == ("offset@load_cell",)
-    assert can.alike["offset@load_cell"] == ("offset@damper",)
+    assert can.confounded["offset@damper"] == ("offset@load_cell",)
+    assert can.confounded["offset@load_cell"] == ("offset@damper",)
     # Force over velocity is all that a damper bench measures.
-    assert set(can.alike["gain@load_cell"]) == {"viscous@damper", "coulomb@damper"}
+    assert set(can.confounded["gain@load_cell"]) == {"viscous@damper", "coulomb@damper"}
     assert {"viscous@damper", "coulomb@damper", "lag@load_cell"} <= set(can.seen)
 
 
@@ -81,7 +81,7 @@ def test_effects_that_the_time_does_not_suffice_for_are_neither_seen_nor_unseen(
 @pytest.mark.slow
 def test_a_mass_and_its_friction_scale_like_the_force_that_moves_them(tmp_path):
     can = rigtwin.identifiability(cart(tmp_path))
-    assert set(can.alike["gain@push"]) <= {"mass@cart", "viscous@rail", "coulomb@rail"}
+    assert set(can.confounded["gain@push"]) <= {"mass@cart", "viscous@rail", "coulomb@rail"}
     assert "viscous@rail" in can.seen
     assert not can.unseen
 
@@ -89,7 +89,7 @@ def test_a_mass_and_its_friction_scale_like_the_force_that_moves_them(tmp_path):
 def test_an_actuator_that_is_watched_directly_hides_nothing():
     can = rigtwin.identifiability(rigtwin.machine("position-actuator"))
     assert not can.unseen
-    assert not can.alike
+    assert not can.confounded
 
 
 def test_joints_that_act_on_each_other_are_moved_too():
@@ -101,7 +101,7 @@ def test_joints_that_act_on_each_other_are_moved_too():
 def test_every_effect_that_is_looked_for_is_judged_once():
     machine = rigtwin.machine("damper-bench")
     can = rigtwin.identifiability(machine)
-    judged = [*can.seen, *can.unseen, *can.alike]
+    judged = [*can.seen, *can.unseen, *can.confounded]
     assert sorted(judged) == sorted(e.name for e in machine.effects() if e.searched)
 
 
@@ -109,4 +109,4 @@ def test_every_effect_that_is_looked_for_is_judged_once():
 def test_the_suspension_rig_can_show_all_that_is_looked_for():
     can = rigtwin.identifiability(rigtwin.machine("suspension-rig"))
     assert not can.unseen
-    assert not can.alike
+    assert not can.confounded

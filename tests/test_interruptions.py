@@ -13,13 +13,13 @@ import pytest
 
 import rigtwin
 from rigtwin.cli import main
-from rigtwin.interruptions import deferred, held_back
+from rigtwin.interruptions import block_sigint, defer_sigint
 
 
 @pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="POSIX")
 def test_a_process_started_meanwhile_gets_no_interruption():
     code = "import os, signal; os.kill(os.getpid(), signal.SIGINT); print('still there')"
-    with held_back():
+    with block_sigint():
         started = subprocess.Popen([sys.executable, "-S", "-c", code], stdout=subprocess.PIPE)
     assert started.communicate(timeout=20)[0] == b"still there\n"
 
@@ -27,7 +27,7 @@ def test_a_process_started_meanwhile_gets_no_interruption():
 @pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="POSIX")
 def test_the_one_that_starts_it_gets_it_behind():
     reached = []
-    with pytest.raises(KeyboardInterrupt), held_back():  # noqa: PT012
+    with pytest.raises(KeyboardInterrupt), block_sigint():  # noqa: PT012
         os.kill(os.getpid(), signal.SIGINT)
         reached.append(True)
     assert reached
@@ -36,16 +36,16 @@ def test_the_one_that_starts_it_gets_it_behind():
 @pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="POSIX")
 def test_another_thread_that_takes_it_changes_nothing():
     reached, over = [], threading.Event()
-    other = threading.Thread(target=over.wait)
-    other.start()
+    thread = threading.Thread(target=over.wait)
+    thread.start()
     try:
-        with pytest.raises(KeyboardInterrupt), held_back():  # noqa: PT012
+        with pytest.raises(KeyboardInterrupt), block_sigint():  # noqa: PT012
             os.kill(os.getpid(), signal.SIGINT)
             time.sleep(0.05)
             reached.append(True)
     finally:
         over.set()
-        other.join()
+        thread.join()
     assert reached
 
 
@@ -82,7 +82,7 @@ def test_a_referee_that_still_records_says_nothing_of_an_interruption(tmp_path, 
 def test_an_interruption_comes_behind_what_it_would_spoil() -> None:
     done = []
 
-    @deferred()
+    @defer_sigint()
     def work() -> None:
         signal.raise_signal(signal.SIGINT)
         done.append("all of it")

@@ -42,34 +42,34 @@ def test_the_error_is_least_at_the_true_value(look):
 
 def test_the_error_is_the_rms_in_percent_of_the_swing(look):
     counts = look.time - look.time[0] > COUNTED
-    left = (look.measured - look.nominal.signals)[0][counts]
-    own = 100.0 * np.sqrt(np.mean(left**2)) / np.std(look.measured[0][counts])
-    assert look.nominal.percent["encoder"] == pytest.approx(own, rel=0.01)
+    residual = (look.measured - look.nominal.signals)[0][counts]
+    percent = 100.0 * np.sqrt(np.mean(residual**2)) / np.std(look.measured[0][counts])
+    assert look.nominal.percent["encoder"] == pytest.approx(percent, rel=0.01)
 
 
 def test_every_candidate_has_a_slider_a_parameter(look):
     assert set(look.sliders) == set(look.effects)
     for name, sliders in look.sliders.items():
-        assert [each.parameter for each in sliders] == list(look.effects[name].kind.parameters)
-        for each in sliders:
-            assert each.low < each.high, each
-            assert each.low <= each.start <= each.high, each
+        assert [slider.parameter for slider in sliders] == list(look.effects[name].kind.parameters)
+        for slider in sliders:
+            assert slider.low < slider.high, slider
+            assert slider.low <= slider.start <= slider.high, slider
 
 
 def test_every_slider_can_be_moved_to_its_ends(look):
     for name, sliders in look.sliders.items():
-        start = [each.start for each in sliders]
-        for number, each in enumerate(sliders):
-            for end in (each.low, each.high):
+        start = [slider.start for slider in sliders]
+        for number, slider in enumerate(sliders):
+            for end in (slider.low, slider.high):
                 moved = (*start[:number], end, *start[number + 1 :])
-                assert np.all(np.isfinite(look.predict({name: moved}).signals)), each
+                assert np.all(np.isfinite(look.predict({name: moved}).signals)), slider
 
 
 def test_a_fit_is_the_diagnosis_and_is_saved_as_a_twin(look, machine, recording, tmp_path):
     fitted = look.fit(["coulomb@guide"])
     values = dict(zip(("coulomb@guide",), fitted.values, strict=True))
-    (found,) = rigtwin.diagnose(recording, machine=machine).effects
-    interval = found.parameters["coulomb"]
+    (finding,) = rigtwin.diagnose(recording, machine=machine).effects
+    interval = finding.parameters["coulomb"]
     assert interval.low <= values["coulomb@guide"][0] <= interval.high
     path = look.save(tmp_path / "twin.toml", values)
     again = rigtwin.look(recording, machine=machine, settings=path)
@@ -85,7 +85,7 @@ def test_a_fit_is_the_diagnosis_and_is_saved_as_a_twin(look, machine, recording,
         (lambda look: look.predict({"coulomb@guide": ()}), "expected 1 values (coulomb), got 0"),
         (lambda look: look.predict({"coulomb@guide": (-1.0,)}), "coulomb = -1; expected 0 to"),
         (lambda look: look.predict({"coulomb@guide": (float("nan"),)}), "coulomb = nan"),
-        (lambda look: look.fit([]), "no effect to fit; there are"),
+        (lambda look: look.fit([]), "no effect to fit; expected some of"),
         (lambda look: look.fit(["coulomb@guide"] * 2), "sets a parameter that another effect"),
         (lambda look: look.save("/nowhere/twin.toml", {}), "cannot write /nowhere/twin.toml"),
     ],

@@ -20,12 +20,12 @@ import pytest
 
 import rigtwin
 from rigtwin.looking import Look, Slider
-from rigtwin.looking.given import read_answer
 from rigtwin.looking.knob import knob_of
 from rigtwin.looking.local_server import HOST, open_server, stop_server
 from rigtwin.looking.page import Page
 from rigtwin.looking.scale import shorten
-from rigtwin.looking.shapes import Body
+from rigtwin.looking.shapes import PosedMachine
+from rigtwin.looking.starting_point import read_diagnosis
 from rigtwin.looking.traces import BUCKETS, mark, thin
 from tests.helpers.browser import BROWSER
 from tests.helpers.described import NOISY, described
@@ -107,20 +107,20 @@ def opened(tab: Tab) -> Tab:
 
 def drag(tab: Tab, name: str, shares: list[float], steps: int = 1) -> list[float]:
     """Moves the slider under a tick to shares of its length; the error at each."""
-    left, y, width, _ = tab.wait_for(f"track('{name}', {steps})")
-    tab.mouse("Pressed", left + shares[0] * width, y)
+    x, y, width, _ = tab.wait_for(f"track('{name}', {steps})")
+    tab.mouse("Pressed", x + shares[0] * width, y)
     errors = []
     for share in shares:
-        tab.mouse("Moved", left + share * width, y)
+        tab.mouse("Moved", x + share * width, y)
         time.sleep(0.4)
         errors.append(tab.ask("overall()"))
-    tab.mouse("Released", left + shares[-1] * width, y)
+    tab.mouse("Released", x + shares[-1] * width, y)
     return errors
 
 
 def press(tab: Tab, text: str) -> None:
-    left, y, width, _ = tab.wait_for(f"button('{text}')")
-    tab.click(left + width / 2, y)
+    x, y, width, _ = tab.wait_for(f"button('{text}')")
+    tab.click(x + width / 2, y)
 
 
 def open_folder(tab: Tab, title: str) -> None:
@@ -159,11 +159,11 @@ def test_a_person_drags_scrubs_fits_and_saves(look, page, tmp_path):
         tab.ask("marked = JSON.stringify(Array.from(traces()[0][0])); true")
         drag(tab, "time, s", [0.5], steps=0)
         assert tab.wait_for("JSON.stringify(Array.from(traces()[0][0])) !== marked")
-        left, y, width, _ = tab.wait_for("box(after('play', 0))")
+        x, y, width, _ = tab.wait_for("box(after('play', 0))")
         seen = tab.ask("scrubbed()")
-        tab.click(left + width / 2, y)
+        tab.click(x + width / 2, y)
         tab.wait_for(f"scrubbed() > {seen} + 0.2 || scrubbed() < {seen}")
-        tab.click(left + width / 2, y)
+        tab.click(x + width / 2, y)
         press(tab, "fit what is ticked")
         tab.wait_for("notes().includes('fitted in')")
         assert tab.ask("overall()") < 0.06 * look.nominal.overall
@@ -174,8 +174,8 @@ def test_a_person_drags_scrubs_fits_and_saves(look, page, tmp_path):
             page.url.split("/")[2]
         }
     again = rigtwin.look(look.recording, machine=look.machine, settings=page.saved_to)
-    (found,) = rigtwin.diagnose(look.recording, machine=look.machine).effects
-    interval = found.parameters["coulomb"]
+    (finding,) = rigtwin.diagnose(look.recording, machine=look.machine).effects
+    interval = finding.parameters["coulomb"]
     assert interval.low <= again.plant({}).guide.coulomb <= interval.high
 
 
@@ -244,13 +244,13 @@ def answer_of(look: Look, effect: str, values: tuple[float, ...]) -> dict[str, o
         "verdict": "explained",
         "sentence": "dry friction of the guide",
         "effects": [
-            found(effect, look, values),
+            entry_of(effect, look, values),
             {"component": "controller", "kind": "setting", "parameters": {}, "confidence": 0.9},
         ],
     }
 
 
-def found(effect: str, look: Look, values: tuple[float, ...]) -> dict[str, object]:
+def entry_of(effect: str, look: Look, values: tuple[float, ...]) -> dict[str, object]:
     """A finding as a diagnosis' JSON has it."""
     kind, _, component = effect.partition("@")
     names = look.effects[effect].kind.parameters
@@ -265,11 +265,11 @@ def found(effect: str, look: Look, values: tuple[float, ...]) -> dict[str, objec
 def test_it_begins_with_what_was_diagnosed(look, tmp_path):
     path = tmp_path / "why.json"
     path.write_text(json.dumps(answer_of(look, EFFECT, (TRUE,))))
-    given = read_answer(path, look)
-    assert given.values == {EFFECT: (TRUE,)}
-    assert given.beside == ("setting@controller",)
+    start = read_diagnosis(path, look)
+    assert start.values == {EFFECT: (TRUE,)}
+    assert start.without_slider == ("setting@controller",)
     with rigtwin.show_look(look, diagnosis=path) as page:
-        assert page.values == given.values
+        assert page.values == start.values
 
 
 @pytest.mark.parametrize(
@@ -359,15 +359,15 @@ def test_a_time_is_marked_from_bottom_to_top():
 @pytest.mark.parametrize("name", rigtwin.machines())
 def test_every_machine_can_be_drawn_and_posed(name):
     machine = rigtwin.machine(name)
-    body = Body(machine)
+    body = PosedMachine(machine)
     shapes = body.shapes()
     assert any(shape.moves for shape in shapes)
     assert all(len(shape.faces) and shape.faces.max() < len(shape.vertices) for shape in shapes)
     joint = next(each.joint for each in machine.components.values() if each.joint)
     still, _ = body.poses({})
     moved, turned = body.poses({joint: 0.1})
-    there, back = body.poses({})
-    assert np.array_equal(still, there)
+    posed, back = body.poses({})
+    assert np.array_equal(still, posed)
     assert not (np.array_equal(moved, still) and np.array_equal(turned, back))
 
 

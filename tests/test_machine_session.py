@@ -19,7 +19,7 @@ from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq.signals import signals_of
 from rigtwin.hardware.daq.table import load_table, to_toml
 from rigtwin.hardware.daq.wired import WiredTwin
-from rigtwin.hardware.session.record import open_virtual_card, record_at_leisure
+from rigtwin.hardware.session.record import open_virtual_card, record_unpaced
 from rigtwin.hardware.session.test import MachineTest
 from tests.test_commanding import lqr
 from tests.test_commanding import machine as upright
@@ -30,37 +30,37 @@ CHANNELS = ("/sensor.place", "/sensor.angle", "/command.force")
 SESSION = ("time", "phase", "drive", "enable", "place", "angle", "late", "missed")
 
 
-def pushes(path: Path, **given) -> MachineTest:
+def pushes(path: Path, **options) -> MachineTest:
     text = CARD.read_text(encoding="utf-8")
     path.write_text(text, encoding="utf-8")
-    found = plan_test("pushes", machine="cart-pole", card=path, settings=SHORT, seed=2, **given)
-    assert isinstance(found, MachineTest)
-    return found
+    planned = plan_test("pushes", machine="cart-pole", card=path, settings=SHORT, seed=2, **options)
+    assert isinstance(planned, MachineTest)
+    return planned
 
 
 def test_a_session_is_the_run_but_for_noise_and_bits(tmp_path: Path) -> None:
-    given = {"seed": 2, "settings": SHORT}
+    options = {"seed": 2, "settings": SHORT}
     path = tmp_path / "s.mcap"
-    ended = rigtwin.run_on_twin("pushes", machine="cart-pole", card=CARD, path=path, **given)
+    ended = rigtwin.run_on_twin("pushes", machine="cart-pole", card=CARD, path=path, **options)
     assert ended.completed
-    found, run = rigtwin.load(path), rigtwin.run("cart-pole", "pushes", **given)
-    assert {t: tuple(n) for t, n in found.columns.items()} == {
+    recording, run = rigtwin.load(path), rigtwin.run("cart-pole", "pushes", **options)
+    assert {t: tuple(n) for t, n in recording.columns.items()} == {
         t: tuple(n) for t, n in run.columns.items()
     }
-    assert found.ticks == run.ticks == 500
-    assert found.machine == "cart-pole"
+    assert recording.ticks == run.ticks == 500
+    assert recording.machine == "cart-pole"
     # Noise of the sensor twice, and a bit of 16.
     for channel, noise, span in (("/sensor.place", 2e-5, 5.0), ("/sensor.angle", 1e-4, 4.0)):
-        apart = np.std(found[channel] - run[channel])
-        assert apart < 1.5 * np.sqrt(2.0 * noise**2 + 2.0 * (2 * span / 65536) ** 2 / 12.0)
-    assert np.array_equal(found["/command.force"], run["/command.force"])
+        difference = np.std(recording[channel] - run[channel])
+        assert difference < 1.5 * np.sqrt(2.0 * noise**2 + 2.0 * (2 * span / 65536) ** 2 / 12.0)
+    assert np.array_equal(recording["/command.force"], run["/command.force"])
 
 
 def test_on_the_virtual_card_it_is_the_same_to_the_last_bit(tmp_path: Path) -> None:
     test = pushes(tmp_path / "card.toml")
     card, device = open_virtual_card(test)
-    record_at_leisure(card, test, tmp_path / "card.mcap")
-    record_at_leisure(WiredTwin(test.terminals(), test.table), test, tmp_path / "twin.mcap")
+    record_unpaced(card, test, tmp_path / "card.mcap")
+    record_unpaced(WiredTwin(test.terminals(), test.table), test, tmp_path / "twin.mcap")
     ours, theirs = (rigtwin.load(tmp_path / f"{name}.mcap") for name in ("card", "twin"))
     for channel in CHANNELS:
         assert np.array_equal(ours[channel], theirs[channel])
@@ -71,7 +71,7 @@ def test_on_the_virtual_card_it_is_the_same_to_the_last_bit(tmp_path: Path) -> N
 def test_the_session_itself_is_recorded(tmp_path: Path) -> None:
     test = pushes(tmp_path / "card.toml")
     assert test.layout.session == SESSION
-    record_at_leisure(WiredTwin(test.terminals(), test.table), test, tmp_path / "s.mcap")
+    record_unpaced(WiredTwin(test.terminals(), test.table), test, tmp_path / "s.mcap")
     from mcap.reader import make_reader
 
     with (tmp_path / "s.mcap").open("rb") as file:
@@ -88,11 +88,11 @@ def test_a_pole_stays_upright_under_a_controller_behind_a_card(tmp_path: Path) -
         "step", machine=of, card=card, path=tmp_path / "s.mcap", controller=lambda _: lqr
     )
     assert ended.completed
-    found = rigtwin.load(tmp_path / "s.mcap")
+    recording = rigtwin.load(tmp_path / "s.mcap")
     run = rigtwin.run(of, "step", controller=lqr)
     # Bits of 0.03 mm and 0.03 mrad, and their differences, go round the loop.
-    assert np.max(np.abs(found["/sensor.place"] - run["/sensor.place"])) < 2e-3
-    assert np.max(np.abs(found["/sensor.angle"])) < 0.02
+    assert np.max(np.abs(recording["/sensor.place"] - run["/sensor.place"])) < 2e-3
+    assert np.max(np.abs(recording["/sensor.angle"])) < 0.02
 
 
 NAMES = ("place", "pace", "angle", "rate")
@@ -114,18 +114,18 @@ def test_what_ends_a_session_leaves_no_force_and_no_power(tmp_path: Path) -> Non
     strict = plan_test(
         "pushes", machine="cart-pole", card=tmp_path / "card.toml", settings=[SHORT, narrow]
     )
-    for each, stop, cause in (
+    for operation, stop, cause in (
         (strict, None, "limit"),
         (plan_own(test, stumbling), None, "controller"),
         (plan_own(test, lambda _: lambda *_: float("nan")), None, "controller"),
         (plan_own(test, lambda _: lambda *_: 25.0), None, "limit"),
         (test, lambda: "enough", "operator"),
     ):
-        card, device = open_virtual_card(each)
+        card, device = open_virtual_card(operation)
         asked = iter([None] * 300)
-        ended = record_at_leisure(
+        ended = record_unpaced(
             card,
-            each,
+            operation,
             tmp_path / "s.mcap",
             stop=lambda stop=stop, asked=asked: next(asked, stop() if stop else None),
         )
@@ -136,10 +136,10 @@ def test_what_ends_a_session_leaves_no_force_and_no_power(tmp_path: Path) -> Non
 
 
 def plan_own(test: MachineTest, make: Callable[[object], object]) -> MachineTest:
-    from rigtwin.hardware.session.own_controller import own_controller
+    from rigtwin.hardware.session.custom_controller import custom_controller
 
-    nothing = {"aim": np.zeros(test.ticks)}
-    return replace(test, own=own_controller(make), demands=nothing)  # type: ignore[arg-type]
+    still = {"aim": np.zeros(test.ticks)}
+    return replace(test, controller=custom_controller(make), demands=still)  # type: ignore[arg-type]
 
 
 def test_it_is_not_armed_outside_its_limits(tmp_path: Path) -> None:
@@ -198,16 +198,16 @@ def test_what_no_card_can_move_is_said(tmp_path: Path) -> None:
 def test_a_machine_without_limits_is_not_moved(tmp_path: Path) -> None:
     card = tmp_path / "card.toml"
     card.write_text(EMPS_CARD, encoding="utf-8")
-    given = {"machine": "emps", "settings": SHORT, "path": tmp_path / "e.mcap"}
-    found = rigtwin.dry_run("positioning", card, **given)
-    assert found.passed
-    assert any("drive has no limits" in line for line in found.obstacles)
+    options = {"machine": "emps", "settings": SHORT, "path": tmp_path / "e.mcap"}
+    result = rigtwin.dry_run("positioning", card, **options)
+    assert result.passed
+    assert any("drive has no limits" in line for line in result.obstacles)
     assert (tmp_path / "card.dry-runs.json").exists()
     signed = EMPS_CARD.replace('"port0/line0"', '"port0/line0"\ncalibrated = "2026-01-31"')
     signed = signed.replace("calibrated", 'operator = "me"\ncalibrated')
     card.write_text(signed.replace("scale", "sign_checked = true\nscale"), encoding="utf-8")
     with pytest.raises(RigtwinError, match="drive has no limits"):
-        rigtwin.run_on_card("positioning", card, arm=lambda _: True, **given)
+        rigtwin.run_on_card("positioning", card, arm=lambda _: True, **options)
 
 
 EMPS_CARD = """
@@ -232,21 +232,23 @@ def test_the_machine_itself_is_run_and_guarded(tmp_path: Path) -> None:
     served = rigtwin.serve_card(card, machine="cart-pole", settings=slow)
     try:
         card.write_text(text.replace('address = ""', f'address = "{served.address}"'))
-        given = {"machine": "cart-pole", "settings": slow, "path": tmp_path / "s.mcap"}
+        options = {"machine": "cart-pole", "settings": slow, "path": tmp_path / "s.mcap"}
         with pytest.raises(RigtwinError, match="no dry run"):
-            rigtwin.run_on_card("pushes", card, arm=lambda _: True, **given)
+            rigtwin.run_on_card("pushes", card, arm=lambda _: True, **options)
         assert (
-            rigtwin.run_on_card("pushes", card, arm=lambda _: False, without_dry_run="me", **given)
+            rigtwin.run_on_card(
+                "pushes", card, arm=lambda _: False, without_dry_run="me", **options
+            )
             is None
         )
         ended = rigtwin.run_on_card(
-            "pushes", card, arm=lambda _: True, without_dry_run="me", **given
+            "pushes", card, arm=lambda _: True, without_dry_run="me", **options
         )
         assert ended is not None
         assert ended.completed, ended
-        found = rigtwin.load(tmp_path / "s.mcap")
+        recording = rigtwin.load(tmp_path / "s.mcap")
         # A computer that is no real-time computer may lose some of the 50 ticks.
-        assert 40 <= found.ticks <= 50
+        assert 40 <= recording.ticks <= 50
         assert not rigtwin.release_card(card, machine="cart-pole")
     finally:
         served.close()
@@ -264,9 +266,9 @@ def test_a_controller_that_cannot_be_made_is_found_before_the_start(
 ) -> None:
     out, card = tmp_path / "s.mcap", tmp_path / "card.toml"
     card.write_text(EMPS_CARD, encoding="utf-8")
-    for name, given in (("positioning", {"machine": "emps", "card": card}), ("drop", {})):
+    for name, options in (("positioning", {"machine": "emps", "card": card}), ("drop", {})):
         with pytest.raises(RigtwinError, match=said):
-            rigtwin.run_on_twin(name, path=out, controller=make, settings=SHORT, **given)
+            rigtwin.run_on_twin(name, path=out, controller=make, settings=SHORT, **options)
         assert not out.exists()
 
 

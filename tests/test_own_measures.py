@@ -52,7 +52,7 @@ COLUMNS = {
 def figure(formula: str, **more: object) -> float:
     emps = find("emps")
     measure = parse_measure("m", {"formula": formula, **more}, list_channels(emps))
-    return pickle.loads(pickle.dumps(measure)).of(Trial(emps.configuration, COLUMNS, 500))
+    return pickle.loads(pickle.dumps(measure)).compute(Trial(emps.configuration, COLUMNS, 500))
 
 
 @pytest.mark.parametrize(
@@ -73,7 +73,7 @@ def test_a_measure_is_its_formula_over_what_counts(formula: str, of: str, value:
 @pytest.mark.parametrize(
     ("table", "said"),
     [
-        ({"formula": "speed"}, "measures.m.formula: unknown 'speed'; there are time, reference"),
+        ({"formula": "speed"}, "measures.m.formula: unknown 'speed'; expected time, reference"),
         ({"formula": "1 + 2"}, "expected a channel in it"),
         ({"formula": "position +"}, "measures.m.formula: "),
         ({"of": "rms"}, "measures.m.formula = None: expected text"),
@@ -95,7 +95,7 @@ def test_every_statistic_of_nothing_is_none() -> None:
     channels = list_channels(find("emps"))
     for name in STATISTICS:
         measure = parse_measure("m", {"formula": "position", "of": name}, channels)
-        assert measure.of(Trial(find("emps").configuration, still)) == 0.0
+        assert measure.compute(Trial(find("emps").configuration, still)) == 0.0
 
 
 def test_a_machine_without_settings_has_nothing_to_tune() -> None:
@@ -110,7 +110,7 @@ def test_a_rig_s_measures_are_not_another_machine_s() -> None:
         "minimise": "ride",
         "parameters": {"controller.kp": [1, 2]},
     }
-    with pytest.raises(rigtwin.RigtwinError, match=r"unknown 'ride'; there are none; \[measures"):
+    with pytest.raises(rigtwin.RigtwinError, match=r"unknown 'ride'; expected none; \[measures"):
         parse_study("s", tables, find("emps"))
 
 
@@ -127,13 +127,13 @@ def test_a_drive_is_tuned_and_its_settings_run(tmp_path: Path, capsys) -> None:
     study, folder = tmp_path / "study.toml", tmp_path / "out"
     study.write_text(STUDY)
     assert main(["tune", str(study), "--out", str(folder), "--workers", "2"]) == 0
-    told = capsys.readouterr().out
-    line = next(line for line in told.splitlines() if line.startswith("rigtwin run positioning"))
+    output = capsys.readouterr().out
+    line = next(line for line in output.splitlines() if line.startswith("rigtwin run positioning"))
     assert "emps.toml --config" in line
     before = rigtwin.run("emps", "positioning", settings=SETTINGS)
     tuned = rigtwin.run("emps", "positioning", settings=[SETTINGS, folder / "tuned.toml"])
-    for each in (load(folder / "best.mcap"), tuned):
-        assert np.std(error(each)) < 0.8 * np.std(error(before))
+    for recording in (load(folder / "best.mcap"), tuned):
+        assert np.std(error(recording)) < 0.8 * np.std(error(before))
 
 
 @pytest.mark.slow

@@ -68,12 +68,12 @@ def test_other_readers_read_it(tmp_path):
         assert summary is not None
         assert summary.statistics is not None
         assert summary.statistics.message_count == 3000
-        found = [
+        values = [
             message.load_cell
             for _, channel, _, message in reader.iter_decoded_messages(topics=["/sensor"])
             if channel
         ]
-        assert np.array_equal(found, data["sensor"][:, 3])
+        assert np.array_equal(values, data["sensor"][:, 3])
         late = [
             message.log_time
             for _, _, message in reader.iter_messages(topics=["/command"], starting_at=900_000_000)
@@ -94,7 +94,7 @@ def test_json_and_other_protobuf_writers_are_read(tmp_path, omit):
         writer.start()
         schema = writer.register_schema("sensor", "jsonschema", b"{}")
         sensor = writer.register_channel("/sensor", "json", schema)
-        other = writer.register_channel("/weather", "json", schema)
+        weather = writer.register_channel("/weather", "json", schema)
         config = json.dumps({"controller": CONTROLLER})
         about = {
             "format": "1",
@@ -111,7 +111,7 @@ def test_json_and_other_protobuf_writers_are_read(tmp_path, omit):
             writer.add_message(
                 sensor, tick * 1_000_000, json.dumps({**row, "extra": 1}).encode(), tick * 1_000_000
             )
-            writer.add_message(other, tick * 1_000_000, b"{}", tick * 1_000_000)
+            writer.add_message(weather, tick * 1_000_000, b"{}", tick * 1_000_000)
         writer.finish()
     recording = load(path)
     assert list(recording.columns["/sensor"]) == [*fields, "extra"], (
@@ -423,11 +423,11 @@ def test_names_that_cannot_be_read_are_not_written(tmp_path):
 
 def chunks_of(data: bytes) -> list[int]:
     """Where the chunks begin."""
-    found, at = [], data.find(b"\x04\x00\x00\x00zstd")
+    chunks, at = [], data.find(b"\x04\x00\x00\x00zstd")
     while at >= 0:
-        found += [at - 37] if data[at - 37] == 6 else []
+        chunks += [at - 37] if data[at - 37] == 6 else []
         at = data.find(b"\x04\x00\x00\x00zstd", at + 1)
-    return found
+    return chunks
 
 
 @pytest.mark.parametrize("place", [1, 5, 29, 40, 60], ids=str)
@@ -455,9 +455,9 @@ def test_settings_that_are_other_than_written_are_not_believed(tmp_path):
     before = load(tmp_path / "r.mcap")
     whole = (tmp_path / "r.mcap").read_bytes()
     name, value = "kp", CONTROLLER["kp"]
-    told = json.dumps({name: value}).strip("{}").encode()
-    assert whole.count(told) == 1
-    (tmp_path / "d.mcap").write_bytes(whole.replace(told, told[:-1] + b"7"))
+    text = json.dumps({name: value}).strip("{}").encode()
+    assert whole.count(text) == 1
+    (tmp_path / "d.mcap").write_bytes(whole.replace(text, text[:-1] + b"7"))
     recording = load(tmp_path / "d.mcap")
     assert before.controller == CONTROLLER
     assert recording.controller == {}

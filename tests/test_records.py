@@ -28,22 +28,22 @@ def chunk(messages: list[tuple[int, int, bytes]]) -> Chunk:
 
 
 def one_by_one(of: Chunk) -> Taken:
-    found: Taken = defaultdict(list)
+    taken: Taken = defaultdict(list)
     for record in breakup_chunk(of, validate_crc=True):
         assert isinstance(record, Message)
-        found[record.channel_id].append((record.log_time, record.data))
-    return found
+        taken[record.channel_id].append((record.log_time, record.data))
+    return taken
 
 
 def at_once(of: Chunk) -> Taken:
-    found: Taken = defaultdict(list)
+    taken: Taken = defaultdict(list)
     for record in take_apart(of):
         if isinstance(record, Messages):
-            found[record.channel_id] += zip(record.times, record.data, strict=True)
+            taken[record.channel_id] += zip(record.times, record.data, strict=True)
         else:
             assert isinstance(record, Message)
-            found[record.channel_id].append((record.log_time, record.data))
-    return found
+            taken[record.channel_id].append((record.log_time, record.data))
+    return taken
 
 
 @pytest.mark.parametrize("seed", range(40))

@@ -20,7 +20,7 @@ from rigtwin.description.configuration import Configuration
 from rigtwin.simulation.runner import simulate
 from rigtwin.simulation.safety import Trip
 from rigtwin.studies.sweep import Store
-from rigtwin.studies.sweep.workers import Here
+from rigtwin.studies.sweep.workers import SerialExecutor
 from rigtwin.studies.tuning.bench import Bench
 from rigtwin.studies.tuning.evaluation import compare
 from rigtwin.studies.tuning.run import LIMITS, TRIP, rig_trial
@@ -47,8 +47,8 @@ def test_without_a_defect_the_force_error_equals_the_twins_to_5_percent():
     demands = experiment.demands(configuration, 2)
 
     def error(ran) -> float:
-        found = rig_trial(configuration, ran.commands, ran.truth).tracking
-        return found.force_e1 + found.force_e2
+        tracking = rig_trial(configuration, ran.commands, ran.truth).tracking
+        return tracking.force_e1 + tracking.force_e2
 
     assert error(drive(Truth(), configuration, demands, 2)) == pytest.approx(
         error(simulate(configuration, demands, 2)), rel=0.05
@@ -93,17 +93,17 @@ def test_the_check_tunes_on_what_was_diagnosed_and_judges_on_the_rig(tmp_path, m
     said: list[TuningCase] = []
     with Store(tmp_path / "s.sqlite") as store:
         study = parse_study("s", STUDY, find_machine(DEFAULT_MACHINE))
-        found = check(Bench(study, store, Here()), 1, 4, show=said.append)
+        report = check(Bench(study, store, SerialExecutor()), 1, 4, show=said.append)
         made = len(store)
-        again = check(Bench(study, store, Here()), 1, 4)
+        again = check(Bench(study, store, SerialExecutor()), 1, 4)
         assert len(store) == made
-    assert found == said == again
-    (case,) = found
+    assert report == said == again
+    (case,) = report
     assert case.sentence == "more friction"
     assert case.against_nominal.runs == 6
     both = (case.against_nominal, case.against_before)
-    assert len({each.of("force_error").after for each in both}) == 1
-    assert "1 of 1" in text(study, found) or "0 of 1" in text(study, found)
+    assert len({each.change_of("force_error").after for each in both}) == 1
+    assert "1 of 1" in text(study, report) or "0 of 1" in text(study, report)
 
 
 def test_what_is_better_is_counted_by_its_interval():

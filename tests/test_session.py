@@ -36,7 +36,7 @@ from rigtwin.hardware.daq.terminals import Terminals
 from rigtwin.hardware.daq.wired import InRealTime, WiredTwin
 from rigtwin.hardware.realtime import Pacer, in_real_time, list_shortcomings, sleep_until
 from rigtwin.hardware.session import permission
-from rigtwin.hardware.session.dry_run import digest, enter, has_passed, ledger
+from rigtwin.hardware.session.dry_run import add_dry_run, digest, has_passed, ledger
 from rigtwin.hardware.session.plan import PlannedTest, parse_plan
 from rigtwin.hardware.session.record import record_in_real_time
 from rigtwin.hardware.session.test import Test
@@ -111,10 +111,10 @@ def test_a_dry_run_in_python_is_that_of_the_command(card, tmp_path, monkeypatch,
     monkeypatch.chdir(tmp_path)
     short = {"timing": {"duration": 1}, "safety": {"ramp": 0.3, "hold": 0.1}}
     path = tmp_path / "d.mcap"
-    found = rigtwin.dry_run("imposed", card, path=path, settings=short)
-    assert found.passed
-    assert {"force", "travel"} <= {peak.name for peak in found.peaks}
-    assert any("driver is missing" in line for line in found.obstacles)
+    result = rigtwin.dry_run("imposed", card, path=path, settings=short)
+    assert result.passed
+    assert {"force", "travel"} <= {peak.name for peak in result.peaks}
+    assert any("driver is missing" in line for line in result.obstacles)
     # So the rig may be armed for just that: it is the driver that is missing then.
     assert main(["run", "imposed", "--target", "daq", "--card", str(card), *SHORT]) == 1
     assert "driver is missing" in capsys.readouterr().err
@@ -130,21 +130,21 @@ def test_another_setting_is_another_session(tmp_path):
         return digest(test.experiment, test.configuration, test.list_demands(), test.table)
 
     base = session()
-    others = [
+    changed = [
         session("controller.kp=0.31"),
         session("safety.force=1400"),
         session("timing.duration=1.1"),
     ]
-    others.append(replace(base, experiment="drop"))
-    others.append(replace(base, demands=base.demands * 1.0001))
-    others.append(replace(base, table=replace(TABLE, device="Dev2")))
-    keys = [key(test) for test in (base, *others)]
+    changed.append(replace(base, experiment="drop"))
+    changed.append(replace(base, demands=base.demands * 1.0001))
+    changed.append(replace(base, table=replace(TABLE, device="Dev2")))
+    keys = [key(test) for test in (base, *changed)]
     assert len(set(keys)) == len(keys)
     assert key(base) == key(session())
     path = tmp_path / "card.toml"
     assert not has_passed(path, keys[0])
-    enter(path, keys[0], {"experiment": "imposed"})
-    enter(path, keys[1], {"experiment": "imposed"})
+    add_dry_run(path, keys[0], {"experiment": "imposed"})
+    add_dry_run(path, keys[1], {"experiment": "imposed"})
     assert has_passed(path, keys[0])
     assert has_passed(path, keys[1])
     assert not has_passed(path, keys[2])
@@ -370,9 +370,9 @@ def test_every_wrong_sign_is_found(signs):
     assert ended.cause == COMPLETED
     measured = np.array(rows)[:, list(RIG_LAYOUT.topics["/sensor"].values())]
     moved = {line.name: sign for line, sign in zip(TABLE.outputs, signs[4:], strict=True)}
-    found, _ = correct_signs(TABLE, fit_responses(measured, demands), moved)
-    assert [line.scaling.sign for line in found.lines] == list(signs)
-    assert all(line.sign_checked for line in found.lines)
+    corrected, _ = correct_signs(TABLE, fit_responses(measured, demands), moved)
+    assert [line.scaling.sign for line in corrected.lines] == list(signs)
+    assert all(line.sign_checked for line in corrected.lines)
 
 
 def test_a_dead_signal_is_no_sign():
@@ -556,11 +556,11 @@ def test_the_live_view_is_served_on_this_computer_only():
         pass
     with pytest.raises(RigtwinError, match="no live view on port"):
         open_live_view(port, fields)
-    others = {
+    changed = {
         str(address[4][0])
         for address in socket.getaddrinfo(socket.gethostname(), None, socket.AF_INET)
     } - {"127.0.0.1"}
-    for address in others:
+    for address in changed:
         with pytest.raises(OSError, match=r".*"), socket.create_connection((address, port), 1.0):
             pass
 
@@ -584,8 +584,8 @@ def test_a_list_is_run_on_the_twin_of_any_machine(tmp_path, capsys):
     said = capsys.readouterr().out
     assert "1.000 s recorded" in said
     assert said.count("encoder") == 2
-    one, two = (rigtwin.load(folder / f"{name}.mcap", toml) for name in ("one", "two"))
-    assert (one.ticks, two.ticks) == (1000, 4000)
+    first, two = (rigtwin.load(folder / f"{name}.mcap", toml) for name in ("one", "two"))
+    assert (first.ticks, two.ticks) == (1000, 4000)
     assert main([*session, "--resume"]) == 0
     assert "2 of 2 tests are done already" in capsys.readouterr().out
     for option, said in (

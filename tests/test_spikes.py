@@ -63,14 +63,14 @@ def test_finds_the_friction_and_every_reversal(calibration):
 def test_what_the_compensators_gain_with_the_nominal_force_loop(calibration):
     """The thesis' goals on another road: 37 % less e1 + e2, half the spike; and the observer beats
     it."""
-    found = {
+    settings = {
         name: float(getattr(calibration.settings, name)) for name in (*BOUNDS, "friction_step")
     }
-    none, thesis, own = (
-        errors(run_compensated(5, compensator=kind, **found))
+    none, thesis, observer = (
+        errors(run_compensated(5, compensator=kind, **settings))
         for kind in (Compensator.NONE, Compensator.TWO_STEP, Compensator.OBSERVER)
     )
-    total = [one["tracking"] + one["numerical"] for one in (none, thesis, own)]
+    total = [one["tracking"] + one["numerical"] for one in (none, thesis, observer)]
     assert total[1] < (1 - 0.37) * total[0]
     assert thesis["spike"] < 0.5 * none["spike"]
     assert total[2] < 0.7 * total[1]
@@ -93,12 +93,12 @@ def test_refuses_what_it_cannot_use(recording, example):
         for topic, channels in example.columns.items()
     }
     columns["/sensor"]["load_cell"][7] = np.nan
-    with pytest.raises(RigtwinError, match=r"/sensor\.load_cell has values that are no numbers"):
+    with pytest.raises(RigtwinError, match=r"/sensor\.load_cell has values that are not finite"):
         find_compensator(dataclasses.replace(example, columns=columns), settings)
     columns["/sensor"]["load_cell"] = filter_lag(
         186.0 * columns["/command"]["voltage"], MOTOR_LAG, example.period
     )
-    with pytest.raises(RigtwinError, match="no dry friction"):
+    with pytest.raises(RigtwinError, match="expected dry friction"):
         find_compensator(dataclasses.replace(example, columns=columns), settings)
 
 

@@ -65,25 +65,25 @@ def drawn(count, seed=0, spread=1.0, tyre_damping=True):
 
 class TestModels:
     def test_known_poles(self):
-        found = poles(MODELS["suspension"](CHOSEN, 0.2))
-        assert sorted(found.imag) == pytest.approx(
+        computed = poles(MODELS["suspension"](CHOSEN, 0.2))
+        assert sorted(computed.imag) == pytest.approx(
             [-5.1167, -1.9544, 0.0, 1.9544, 5.1167], abs=5e-5
         )
-        assert found.real == pytest.approx([-5.0, 0.0, 0.0, 0.0, 0.0], abs=1e-9)
+        assert computed.real == pytest.approx([-5.0, 0.0, 0.0, 0.0, 0.0], abs=1e-9)
 
     @pytest.mark.parametrize(
         ("name", "expected"),
         [("boeing-707", 18.90 + 109.5j), ("truck", 14.33 + 107.9j), ("motorcycle", 0.595 + 93.5j)],
     )
     def test_vehicles_of_table_6_1_on_the_rig(self, name, expected):
-        found = rightmost(
+        pole = rightmost(
             rig(
                 QuarterCar(tyre_damping=0.0, **VEHICLES[name]._asdict()),
                 Lags(0.01, 0.01, 0.01, 0.01),
             )
         )
-        assert found.real == pytest.approx(expected.real, abs=0.006)
-        assert found.imag == pytest.approx(expected.imag, abs=0.06)
+        assert pole.real == pytest.approx(expected.real, abs=0.006)
+        assert pole.imag == pytest.approx(expected.imag, abs=0.06)
 
     def test_table_6_2_on_the_rig(self):
         assert rightmost(MODELS["rig"](TABLE_6_2, 0.01)).real == pytest.approx(-0.262, abs=5e-4)
@@ -92,14 +92,14 @@ class TestModels:
     def test_eigenvalues_are_the_roots_of_the_loop(self, model):
         for car, lag in zip(drawn(20), np.logspace(-3, 0, 20), strict=True):
             expected = lag_roots(LOOPS[model](car), lag)
-            found = poles(MODELS[model](car, lag))
-            if len(found) > len(
+            computed = poles(MODELS[model](car, lag))
+            if len(computed) > len(
                 expected
             ):  # The two filters of position and velocity share a pole that no output sees.
                 expected = np.append(expected, -1.0 / lag)
-            assert len(found) == len(expected)
-            nearest = np.abs(found[:, None] - expected[None, :])
-            assert np.all(nearest.min(axis=1) < 1e-6 * np.abs(found))
+            assert len(computed) == len(expected)
+            nearest = np.abs(computed[:, None] - expected[None, :])
+            assert np.all(nearest.min(axis=1) < 1e-6 * np.abs(computed))
             assert np.all(nearest.min(axis=0) < 1e-6 * np.abs(expected))
 
     def test_ideal_models_are_the_limit_of_no_lag(self):
@@ -148,18 +148,18 @@ class TestModels:
 class TestCriticalLag:
     def test_single_mass_is_b_over_k(self):
         for car in drawn(30, spread=2.0):
-            found = critical_lag(single_mass(car.sprung))
-            assert found is not None
-            assert found.time == pytest.approx(
+            crossing = critical_lag(single_mass(car.sprung))
+            assert crossing is not None
+            assert crossing.time == pytest.approx(
                 car.suspension_damping / car.suspension_stiffness, rel=1e-9
             )
-            assert found.frequency == pytest.approx(car.sprung.natural_frequency, rel=1e-9)
+            assert crossing.frequency == pytest.approx(car.sprung.natural_frequency, rel=1e-9)
 
     def test_suspension_is_b_over_k_without_tyre_damping_alone(self):
         for car in drawn(30, tyre_damping=False):
-            found = critical_lag(LOOPS["suspension"](car))
-            assert found is not None
-            assert found.time == pytest.approx(
+            crossing = critical_lag(LOOPS["suspension"](car))
+            assert crossing is not None
+            assert crossing.time == pytest.approx(
                 car.suspension_damping / car.suspension_stiffness, rel=1e-6
             )
         damped = critical_lag(LOOPS["suspension"](CHOSEN._replace(tyre_damping=10.0)))
@@ -167,13 +167,13 @@ class TestCriticalLag:
         assert damped.time == pytest.approx(0.2170, abs=1e-4)
 
     def test_thesis_values(self):
-        found = critical_lag(LOOPS["structure"](CHOSEN))
-        assert found is not None
-        assert found.time == pytest.approx(0.06895, abs=5e-6)
+        crossing = critical_lag(LOOPS["structure"](CHOSEN))
+        assert crossing is not None
+        assert crossing.time == pytest.approx(0.06895, abs=5e-6)
         # Two lags in series: Routh-Hurwitz gives k/b = (2 − τ b/m)/(4τ).
-        found = critical_lag(single_mass(SingleMass(50.0, 49.995, 1.0), lags=2))
-        assert found is not None
-        assert found.time == pytest.approx(0.01, rel=1e-9)
+        crossing = critical_lag(single_mass(SingleMass(50.0, 49.995, 1.0), lags=2))
+        assert crossing is not None
+        assert crossing.time == pytest.approx(0.01, rel=1e-9)
 
     @pytest.mark.parametrize("model", LOOPS)
     def test_against_routh_and_hurwitz_in_exact_fractions(self, model):
@@ -186,26 +186,26 @@ class TestCriticalLag:
         cars += [CHOSEN._replace(suspension_damping=1e9), CHOSEN._replace(tyre_damping=1e9)]
         outcomes = set()
         for car in cars:
-            found = critical_lag(LOOPS[model](car))
-            if found is None:
+            crossing = critical_lag(LOOPS[model](car))
+            if crossing is None:
                 assert all(hurwitz(exact(model, car, lag)) for lag in np.logspace(-6, 5, 23))
-            elif found.time == 0.0:
+            elif crossing.time == 0.0:
                 assert not hurwitz(exact(model, car, 0.0))
             else:
                 assert all(
-                    hurwitz(exact(model, car, found.time * part))
+                    hurwitz(exact(model, car, crossing.time * part))
                     for part in (1e-3, 0.1, 0.3, 0.5, 0.7, 0.9, 0.999)
                 )
-                assert not hurwitz(exact(model, car, found.time * 1.001))
-            outcomes.add(found is None or found.time > 0.0)
+                assert not hurwitz(exact(model, car, crossing.time * 1.001))
+            outcomes.add(crossing is None or crossing.time > 0.0)
         assert True in outcomes
 
     @pytest.mark.parametrize("model", LOOPS)
     def test_against_bisection_on_the_rightmost_pole(self, model):
         for car in drawn(8, seed=5):
-            found = critical_lag(LOOPS[model](car))
-            assert found is not None
-            low, high = 0.0, found.time * 1.5
+            crossing = critical_lag(LOOPS[model](car))
+            assert crossing is not None
+            low, high = 0.0, crossing.time * 1.5
             assert rightmost(MODELS[model](car, high)).real > 0.0
             for _ in range(60):
                 middle = 0.5 * (low + high)
@@ -214,17 +214,17 @@ class TestCriticalLag:
                     if rightmost(MODELS[model](car, middle)).real > 0.0
                     else (middle, high)
                 )
-            assert high == pytest.approx(found.time, rel=1e-6)
-            assert rightmost(MODELS[model](car, found.time)).imag == pytest.approx(
-                found.frequency, rel=1e-6
+            assert high == pytest.approx(crossing.time, rel=1e-6)
+            assert rightmost(MODELS[model](car, crossing.time)).imag == pytest.approx(
+                crossing.frequency, rel=1e-6
             )
 
     def test_without_damping_there_is_no_time_to_lose(self):
         for model, loop in LOOPS.items():
             for critical in (critical_lag, critical_delay):
-                found = critical(loop(CHOSEN._replace(suspension_damping=0.0)))
-                assert found is not None, model
-                assert found.time == 0.0
+                crossing = critical(loop(CHOSEN._replace(suspension_damping=0.0)))
+                assert crossing is not None, model
+                assert crossing.time == 0.0
 
     def test_a_loop_of_low_gain_is_stable_with_every_lag(self):
         loop = {0: Polynomial([2.0, 2.0, 1.0]), 1: Polynomial([0.5]), 2: Polynomial([0.3])}
@@ -239,10 +239,10 @@ class TestCriticalDelay:
         m, k, b = mass
         square = (b**2 + np.sqrt(b**4 + 4.0 * m**2 * k**2)) / (2.0 * m**2)
         frequency = float(np.sqrt(square))
-        found = critical_delay(single_mass(mass))
-        assert found is not None
-        assert found.frequency == pytest.approx(frequency, rel=1e-9)
-        assert found.time == pytest.approx(np.arctan2(frequency * b, k) / frequency, rel=1e-9)
+        crossing = critical_delay(single_mass(mass))
+        assert crossing is not None
+        assert crossing.frequency == pytest.approx(frequency, rel=1e-9)
+        assert crossing.time == pytest.approx(np.arctan2(frequency * b, k) / frequency, rel=1e-9)
 
     @pytest.mark.parametrize("model", LOOPS)
     def test_against_a_simulation_of_the_delay_differential_equation(self, model):
@@ -290,21 +290,21 @@ class TestCriticalDelay:
 class TestLocus:
     def test_crossings_of_a_sweep_are_the_critical_lag(self):
         for model in ("structure", "combined"):
-            found = Locus(model, np.logspace(-3, 0, 60), lambda lag: Setting(CHOSEN, lag))
+            locus = Locus(model, np.logspace(-3, 0, 60), lambda lag: Setting(CHOSEN, lag))
             critical = critical_lag(LOOPS[model](CHOSEN))
             assert critical is not None
-            assert found.crossings[0].value == pytest.approx(critical.time, rel=1e-6)
-            assert found.crossings[0].frequency == pytest.approx(critical.frequency, rel=1e-6)
-            assert (found.crossings[0].mode, found.crossings[0].unstable) == (BODY, True)
+            assert locus.crossings[0].value == pytest.approx(critical.time, rel=1e-6)
+            assert locus.crossings[0].frequency == pytest.approx(critical.frequency, rel=1e-6)
+            assert (locus.crossings[0].mode, locus.crossings[0].unstable) == (BODY, True)
 
     def test_both_modes_cross_together_with_suspension_mil(self):
-        found = Locus("suspension", np.logspace(-3, 0, 60), lambda lag: Setting(CHOSEN, lag))
-        assert {crossing.mode for crossing in found.crossings} == {BODY, WHEEL}
-        assert [crossing.value for crossing in found.crossings] == pytest.approx(
+        locus = Locus("suspension", np.logspace(-3, 0, 60), lambda lag: Setting(CHOSEN, lag))
+        assert {crossing.mode for crossing in locus.crossings} == {BODY, WHEEL}
+        assert [crossing.value for crossing in locus.crossings] == pytest.approx(
             [0.2, 0.2], rel=1e-6
         )
-        assert found.unstable_modes(0.1) == ()
-        assert found.unstable_modes(0.3) == (BODY, WHEEL)
+        assert locus.unstable_modes(0.1) == ()
+        assert locus.unstable_modes(0.3) == (BODY, WHEEL)
 
     def test_modes_are_told_apart_by_eigenvectors(self):
         for car in drawn(10, seed=8, tyre_damping=False):
@@ -312,18 +312,18 @@ class TestLocus:
             system = ideal_quarter_car(car)
             values, vectors = np.linalg.eig(np.asarray(system.A))
             for value, vector in zip(values, vectors.T, strict=True):
-                same = (vector[0] / vector[1]).real > 0.0
-                assert mode(car, value) == (BODY if same else WHEEL)
+                in_phase = (vector[0] / vector[1]).real > 0.0
+                assert mode(car, value) == (BODY if in_phase else WHEEL)
 
 
 class TestMapping:
     def test_boundary_is_the_critical_lag(self):
-        other = Axis("suspension_damping", np.linspace(50.0, 400.0, 8))
+        damping = Axis("suspension_damping", np.linspace(50.0, 400.0, 8))
         lags = Axis("tau", np.logspace(-2, 0, 80))
-        found = stability_map("structure", CHOSEN, 0.01, lags, other)
-        assert found.rightmost.shape == (8, 80)
-        assert found.critical is not None
-        for row, critical in zip(found.rightmost, found.critical, strict=True):
+        stability = stability_map("structure", CHOSEN, 0.01, lags, damping)
+        assert stability.rightmost.shape == (8, 80)
+        assert stability.critical is not None
+        for row, critical in zip(stability.rightmost, stability.critical, strict=True):
             first = lags.values[np.argmax(row > 0.0)]
             assert critical <= first <= critical * 1.1
 
@@ -333,27 +333,27 @@ class TestMapping:
             around("tyre_damping", TABLE_6_2, 0.01, 10),
         )
         assert up.values[0] == 0.0
-        found = stability_map("rig", TABLE_6_2, 0.01, across, up)
+        stability = stability_map("rig", TABLE_6_2, 0.01, across, up)
         car = TABLE_6_2._replace(
             suspension_stiffness=float(across.values[3]), tyre_damping=float(up.values[4])
         )
-        assert found.rightmost[4, 3] == pytest.approx(rightmost(MODELS["rig"](car, 0.01)).real)
-        draw(found, tmp_path / "map.png")
+        assert stability.rightmost[4, 3] == pytest.approx(rightmost(MODELS["rig"](car, 0.01)).real)
+        draw(stability, tmp_path / "map.png")
         assert (tmp_path / "map.png").stat().st_size > 10_000
 
     def test_bad_input(self, tmp_path):
         axis = around("tau", CHOSEN, 0.01, 4)
         with pytest.raises(
-            RigtwinError, match="unknown parameter 'mass'; there are tyre_stiffness"
+            RigtwinError, match="unknown parameter 'mass'; expected one of tyre_stiffness"
         ):
             around("mass", CHOSEN, 0.01)
         with pytest.raises(RigtwinError, match="two different parameters"):
             stability_map("rig", CHOSEN, 0.01, axis, axis)
         with pytest.raises(RigtwinError, match="unknown model 'x'"):
             stability_map("x", CHOSEN, 0.01, axis, around("sprung_mass", CHOSEN, 0.01, 4))
-        found = stability_map("rig", CHOSEN, 0.01, axis, around("sprung_mass", CHOSEN, 0.01, 4))
+        stability = stability_map("rig", CHOSEN, 0.01, axis, around("sprung_mass", CHOSEN, 0.01, 4))
         with pytest.raises(RigtwinError, match=r"cannot draw 'map\.txt'"):
-            draw(found, tmp_path / "map.txt")
+            draw(stability, tmp_path / "map.txt")
 
 
 class TestInput:
@@ -464,28 +464,28 @@ def exact(model, car, lag):
     structure = power(factor, structures)
     if model == "single-mass":
         return total(product(sprung, force), suspension)
-    own = product(product(sprung, wheel), product(force, structure))
-    return total(own, product(suspension, total(wheel, product(sprung, structure))))
+    characteristic = product(product(sprung, wheel), product(force, structure))
+    return total(characteristic, product(suspension, total(wheel, product(sprung, structure))))
 
 
-def product(one, other):
-    found = [Fraction(0)] * (len(one) + len(other) - 1)
-    for i, a in enumerate(one):
-        for j, b in enumerate(other):
-            found[i + j] += a * b
-    return found
+def product(first, second):
+    coefficients = [Fraction(0)] * (len(first) + len(second) - 1)
+    for i, a in enumerate(first):
+        for j, b in enumerate(second):
+            coefficients[i + j] += a * b
+    return coefficients
 
 
-def power(one, exponent):
-    found = [Fraction(1)]
+def power(base, exponent):
+    result = [Fraction(1)]
     for _ in range(exponent):
-        found = product(found, one)
-    return found
+        result = product(result, base)
+    return result
 
 
-def total(one, other):
-    length = max(len(one), len(other))
-    return [sum(each[i] for each in (one, other) if i < len(each)) for i in range(length)]
+def total(first, second):
+    length = max(len(first), len(second))
+    return [sum(each[i] for each in (first, second) if i < len(each)) for i in range(length)]
 
 
 def hurwitz(ascending):
@@ -562,10 +562,10 @@ def growth(model, car, delay, steps=40, cycles=700):
 def stepped(states, past, whole, offsets, rows):
     for at in range(past, len(states) - 1):
         now = next_ = 0.0
-        for each in range(len(offsets)):
+        for number in range(len(offsets)):
             for i in range(4):
-                now += rows[each, i] * states[at - offsets[each], i]
-                next_ += rows[each, i] * states[at + 1 - offsets[each], i]
+                now += rows[number, i] * states[at - offsets[number], i]
+                next_ += rows[number, i] * states[at + 1 - offsets[number], i]
         for i in range(4):
             following = whole[i, 4] * now + whole[i, 5] * (next_ - now)
             for j in range(4):
@@ -574,9 +574,9 @@ def stepped(states, past, whole, offsets, rows):
 
 
 def critical_frequency(model, car):
-    found = critical_delay(LOOPS[model](car))
-    assert found is not None
-    return found.frequency
+    crossing = critical_delay(LOOPS[model](car))
+    assert crossing is not None
+    return crossing.frequency
 
 
 def test_the_polynomial_in_fractions_is_that_of_the_loop():

@@ -32,21 +32,21 @@ def test_text_of_a_papers_figure_stays_text(recording, tmp_path):
     drawn = recording.plot(
         tmp_path / "f.svg", style="paper", panels=["wheel", "ground"]
     ).read_text()
-    found = re.findall(r">(wheel, mm|ground, mm|time, s|suspension travel, mm)<", drawn)
-    assert sorted(found) == ["ground, mm", "time, s", "wheel, mm"]
+    titles = re.findall(r">(wheel, mm|ground, mm|time, s|suspension travel, mm)<", drawn)
+    assert sorted(titles) == ["ground, mm", "time, s", "wheel, mm"]
     assert drawn.index(">wheel, mm<") < drawn.index(">ground, mm<")
     assert recording.path.name not in drawn
 
 
 @pytest.mark.parametrize(
-    ("given", "said"),
+    ("arguments", "said"),
     [
-        (["--style", "papers"], "unknown style 'papers'; there are screen, paper, paper-wide"),
-        (["--panel", "tyre"], "no panel 'tyre'; there are 'ground, mm'"),
+        (["--style", "papers"], "unknown style 'papers'; expected screen, paper, paper-wide"),
+        (["--panel", "tyre"], "no panel 'tyre'; expected one of 'ground, mm'"),
     ],
 )
-def test_what_there_is_not_is_said(recording, tmp_path, capsys, given, said):
-    assert main(["plot", str(recording.path), "-o", str(tmp_path / "f.png"), *given]) == 1
+def test_what_there_is_not_is_said(recording, tmp_path, capsys, arguments, said):
+    assert main(["plot", str(recording.path), "-o", str(tmp_path / "f.png"), *arguments]) == 1
     error = capsys.readouterr().err
     assert said in error
     assert error.count("\n") == 1

@@ -21,10 +21,10 @@ from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq import CARD
 from rigtwin.hardware.daq.table import load_table
 from rigtwin.hardware.daq.wired import WiredTwin
-from rigtwin.hardware.faults.campaign import draw_faults, last_words, try_fault
+from rigtwin.hardware.faults.campaign import draw_faults, read_final_cause, try_fault
 from rigtwin.hardware.faults.kinds import KINDS
-from rigtwin.hardware.faults.processes import Stray, try_process_fault
-from rigtwin.hardware.session.record import open_virtual_card, record_at_leisure
+from rigtwin.hardware.faults.processes import FaultNotReached, try_process_fault
+from rigtwin.hardware.session.record import open_virtual_card, record_unpaced
 from rigtwin.hardware.session.stops import stop_requests
 from rigtwin.hardware.session.test import Test
 from rigtwin.hardware.supervisor import COMPLETED, NEXT, Cause, Phase, Supervisor
@@ -53,16 +53,16 @@ def states(path: Path) -> list[str]:
 
 @pytest.mark.parametrize(("before", "after"), list(itertools.product(Phase, Phase)))
 def test_only_the_ways_that_there_are(before, after):
-    told = []
-    supervisor = Supervisor(told.append)
+    messages = []
+    supervisor = Supervisor(messages.append)
     supervisor.phase = before
     if after in NEXT[before]:
         supervisor.go(after, COMPLETED, 1.0)
-        assert (told[0].before, told[0].after) == (before, after)
+        assert (messages[0].before, messages[0].after) == (before, after)
     else:
         with pytest.raises(RigtwinError, match="no way from"):
             supervisor.go(after, COMPLETED, 1.0)
-        assert (supervisor.phase, told) == (before, [])
+        assert (supervisor.phase, messages) == (before, [])
 
 
 def test_motion_is_reached_and_left_through_every_state_between():
@@ -94,9 +94,9 @@ def test_motion_is_reached_and_left_through_every_state_between():
 def test_card_and_twin_give_the_same_recording(tmp_path, name, seconds):
     test = session(name, f"timing.duration={seconds}", seed=2)
     card, _ = open_virtual_card(test)
-    ended = record_at_leisure(card, test, tmp_path / "card.mcap")
+    ended = record_unpaced(card, test, tmp_path / "card.mcap")
     assert ended.cause == COMPLETED
-    record_at_leisure(WiredTwin(test.terminals(), TABLE), test, tmp_path / "twin.mcap")
+    record_unpaced(WiredTwin(test.terminals(), TABLE), test, tmp_path / "twin.mcap")
     assert (tmp_path / "card.mcap").read_bytes() == (tmp_path / "twin.mcap").read_bytes()
     recording = load(tmp_path / "card.mcap")
     assert (recording.ticks, recording.time[0], recording.notes) == (1000 * seconds, 0.0, ())
@@ -108,7 +108,7 @@ def test_a_software_timed_card_gives_the_same_too(tmp_path):
     for timing in ("hardware", "software"):
         timed = replace(test, table=replace(TABLE, timing=timing))
         card, _ = open_virtual_card(timed)
-        record_at_leisure(card, timed, tmp_path / f"{timing}.mcap")
+        record_unpaced(card, timed, tmp_path / f"{timing}.mcap")
         records.append(load(tmp_path / f"{timing}.mcap"))
     for topic, names in records[0].columns.items():
         for name in names:
@@ -121,7 +121,7 @@ def test_the_ramp_has_no_jump_and_ends_where_the_test_begins(tmp_path):
 
     test = session("drop")
     card, device = open_virtual_card(test)
-    record_at_leisure(card, test, tmp_path / "r.mcap")
+    record_unpaced(card, test, tmp_path / "r.mcap")
     with (tmp_path / "r.mcap").open("rb") as file:
         messages = make_reader(file, decoder_factories=[DecoderFactory()]).iter_decoded_messages(
             topics=["/session"]
@@ -146,7 +146,7 @@ def test_the_rest_before_arming_may_be_ended_too(tmp_path):
     test = session("imposed")
     card, _ = open_virtual_card(test)
     with pytest.raises(RigtwinError, match="not armed: stopped by the operator"):
-        record_at_leisure(card, test, tmp_path / "r.mcap", lambda: "stopped by the operator: test")
+        record_unpaced(card, test, tmp_path / "r.mcap", lambda: "stopped by the operator: test")
     assert states(tmp_path / "r.mcap") == ["faulted"]
 
 
@@ -165,7 +165,7 @@ def test_the_operator_stops_in_every_state(tmp_path, seconds):
         outputs.append((device.tick, float(device.outputs[0]), device.power))
         return "stopped by the operator: test" if device.tick >= at else None
 
-    ended = record_at_leisure(card, test, tmp_path / "r.mcap", stop)
+    ended = record_unpaced(card, test, tmp_path / "r.mcap", stop)
     assert ended.cause.name == "operator"
     assert states(tmp_path / "r.mcap")[-2:] == ["stopping", "stopped"]
     assert device.outputs[0] == 0.0
@@ -193,7 +193,7 @@ def test_any_key_stops():
     import subprocess
     import sys
 
-    main, other = pty.openpty()
+    main, terminal = pty.openpty()
     code = (
         "import time\nfrom rigtwin.hardware.session.stops import stop_requests\n"
         "with stop_requests() as asked:\n print('ready', flush=True)\n"
@@ -201,7 +201,7 @@ def test_any_key_stops():
     )
     process = subprocess.Popen(
         [sys.executable, "-c", code],
-        stdin=other,
+        stdin=terminal,
         stdout=subprocess.PIPE,
         text=True,
         start_new_session=True,
@@ -220,7 +220,7 @@ def test_a_rig_that_is_out_of_its_limits_is_not_armed(tmp_path):
     wired = replace(test, table=replace(TABLE, inputs=(TABLE.inputs[0], wrong, *TABLE.inputs[2:])))
     card, device = open_virtual_card(test, wired.terminals())
     with pytest.raises(RigtwinError, match=r"structure_lvdt is .*; arming needs it within 0\.135"):
-        record_at_leisure(card, test, tmp_path / "r.mcap")
+        record_unpaced(card, test, tmp_path / "r.mcap")
     assert states(tmp_path / "r.mcap") == ["faulted"]
     assert device.outputs[0] == 0.0
     assert not device.power
@@ -244,9 +244,9 @@ def test_every_kind_of_fault_stops_the_rig(tmp_path, kind, seed):
 
 
 def test_who_interrupts_a_campaign_fails_no_session(tmp_path, monkeypatch, capsys):
-    def interrupt(*given):
+    def interrupt(*arguments):
         os.kill(os.getpid(), signal.SIGINT)
-        return healthy(*given)
+        return healthy(*arguments)
 
     monkeypatch.setattr("rigtwin.hardware.session.test.update", interrupt)
     page = tmp_path / "faults.md"
@@ -269,7 +269,7 @@ def test_a_dead_controller_process_is_stopped_for(tmp_path):
     fault = replace(fault, at=1300 + fault.at % 500)
     try:
         outcome = try_process_fault(fault, find(fault.experiment), TABLE, tmp_path)
-    except Stray as busy:
+    except FaultNotReached as busy:
         # Every session was cut short before its fault came: that says nothing of the fault.
         pytest.skip(str(busy))
     assert (outcome.cause, outcome.right, outcome.readable) == ("process", True, True)
@@ -301,7 +301,7 @@ def test_a_loop_that_is_too_slow_is_called_late(tmp_path, ticks, said):
     test = session("road1.6", "timing.duration=3", "safety.ramp=0.4", "safety.hold=0.1")
     card, device = open_virtual_card(test)
     late = test.operation(slowed(device, ticks))
-    ended = record_at_leisure(card, test, tmp_path / "r.mcap", operation=late)
+    ended = record_unpaced(card, test, tmp_path / "r.mcap", operation=late)
     assert said in ended.cause.reason
     recording = load(tmp_path / "r.mcap")
     assert recording.time[0] == 0.0
@@ -316,7 +316,7 @@ def test_ticks_missed_in_the_ramp_do_not_cut_off_the_beginning(tmp_path):
         if device.tick % 50 == 0 and 450 < device.tick < 1000:
             device.run_until(device.tick + 2)
 
-    ended = record_at_leisure(card, test, tmp_path / "r.mcap", stop)
+    ended = record_unpaced(card, test, tmp_path / "r.mcap", stop)
     assert ended.cause == COMPLETED
     recording = load(tmp_path / "r.mcap")
     assert (recording.time[0], recording.ticks) == (0.0, len(test.demands))
@@ -370,10 +370,10 @@ class Hopeless:
 def test_a_rig_that_takes_no_output_any_more_is_stopped_its_own_way(tmp_path):
     test = session("drop")
     rig = Hopeless(WiredTwin(test.terminals(), TABLE))
-    ended = record_at_leisure(rig, test, tmp_path / "r.mcap")
+    ended = record_unpaced(rig, test, tmp_path / "r.mcap")
     assert ended.cause == Cause("rig", "OSError: gone")
     assert rig.stopped >= 1
-    assert last_words(tmp_path / "r.mcap") == ("rig", "OSError: gone")
+    assert read_final_cause(tmp_path / "r.mcap") == ("rig", "OSError: gone")
     assert states(tmp_path / "r.mcap")[-1] == "faulted"
 
 

@@ -20,7 +20,7 @@ from rigtwin.cli import main
 from rigtwin.errors import RigtwinError
 from rigtwin.studies.sweep import Store, iterate_results, open_workers, run_jobs
 from rigtwin.studies.sweep.cluster import _run_if_same
-from rigtwin.studies.sweep.workers import Here
+from rigtwin.studies.sweep.workers import SerialExecutor
 from tests.helpers.jobs import always_deadly, deadly, faulty, process, slow, square
 
 VALUES = {
@@ -41,15 +41,15 @@ def test_a_store_gives_back_to_the_bit(tmp_path):
     with Store(tmp_path / "s.sqlite") as store:
         store["a"] = VALUES
     with Store(tmp_path / "s.sqlite") as store:
-        found = store["a"]
+        result = store["a"]
         assert list(store.keys()) == ["a"]
     for name in ("number", "whole", "endless", "text", "scalar"):
-        assert found[name] == VALUES[name]
-    assert np.isnan(found["none"])
+        assert result[name] == VALUES[name]
+    assert np.isnan(result["none"])
     for name in ("curve", "table", "flags"):
-        assert np.array_equal(found[name], VALUES[name])
-        assert found[name].dtype == VALUES[name].dtype
-    assert np.array_equal(found["list"][1]["deep"], np.ones(2))
+        assert np.array_equal(result[name], VALUES[name])
+        assert result[name].dtype == VALUES[name].dtype
+    assert np.array_equal(result["list"][1]["deep"], np.ones(2))
 
 
 def test_results_of_other_sources_are_not_taken_for_these(tmp_path):
@@ -101,8 +101,8 @@ def test_what_was_done_is_not_done_again(tmp_path):
 
     steps: list[int] = []
     with Store(tmp_path / "s.sqlite") as store:
-        run_jobs(store, Here(), counted, ((str(n), n) for n in range(5)))
-        run_jobs(store, Here(), counted, ((str(n), n) for n in range(8)), steps.append)
+        run_jobs(store, SerialExecutor(), counted, ((str(n), n) for n in range(5)))
+        run_jobs(store, SerialExecutor(), counted, ((str(n), n) for n in range(8)), steps.append)
         assert [store[str(n)] for n in range(8)] == [-n for n in range(8)]
     assert ran == list(range(8))
     assert sum(steps) == 8
@@ -117,22 +117,22 @@ def test_the_answers_do_not_depend_on_the_number_of_workers(count, tmp_path):
 
 def test_several_processes_work():
     with open_workers(2) as workers:
-        found = {
+        results = {
             result
             for _, result in iterate_results(workers, process, ((str(n), n) for n in range(30)))
         }
-    assert len(found) == 2
-    assert os.getpid() not in found
+    assert len(results) == 2
+    assert os.getpid() not in results
 
 
 def test_a_worker_that_is_killed_loses_nothing(tmp_path):
     mark = tmp_path / "mark"
     with open_workers(2) as workers:
-        found = dict(
+        results = dict(
             iterate_results(workers, deadly, ((str(n), (str(mark), n)) for n in range(12)))
         )
     assert mark.exists()
-    assert found == {str(n): 10 * n for n in range(12)}
+    assert results == {str(n): 10 * n for n in range(12)}
 
 
 def test_a_job_that_always_kills_its_worker_is_named_in_the_end():
@@ -149,10 +149,10 @@ def test_a_job_that_fails_ends_the_sweep_and_keeps_what_is_done(count, tmp_path)
     with Store(tmp_path / "s.sqlite") as store:
         with pytest.raises(RigtwinError, match="3 cannot be done"), open_workers(count) as workers:
             run_jobs(store, workers, faulty, ((str(n), n) for n in itertools.count()))
-        kept = {int(key) for key in store.keys()}  # noqa: SIM118
+        stored = {int(key) for key in store.keys()}  # noqa: SIM118
     # What was under way beside it may be lost, nothing else.
-    assert len({0, 1, 2} - kept) < count
-    assert 3 not in kept
+    assert len({0, 1, 2} - stored) < count
+    assert 3 not in stored
 
 
 def test_jobs_are_taken_as_workers_become_free():
@@ -216,10 +216,12 @@ def test_a_sweep_that_is_killed_goes_on_and_leaves_no_worker_behind(tmp_path):
     with closing(sqlite3.connect(path)) as base:
         assert base.execute("SELECT COUNT(*) FROM results").fetchone()[0] >= 6
     with Store(path) as store:
-        kept = set(store.keys())
+        stored = set(store.keys())
         ran: list[int] = []
-        run_jobs(store, Here(), lambda n: ran.append(n) or n, ((str(n), n) for n in range(40)))
-        assert len(kept) + len(ran) == 40
+        run_jobs(
+            store, SerialExecutor(), lambda n: ran.append(n) or n, ((str(n), n) for n in range(40))
+        )
+        assert len(stored) + len(ran) == 40
         assert [store[str(n)] for n in range(40)] == list(range(40))
 
 
@@ -270,9 +272,9 @@ def cluster(tmp_path_factory):
             time.sleep(0.1)
         yield json.loads(file.read_text())["address"], workers
     finally:
-        for one in (*workers, scheduler):
-            one.kill()
-            one.wait()
+        for process in (*workers, scheduler):
+            process.kill()
+            process.wait()
 
 
 def joined(address: str):

@@ -33,10 +33,10 @@ ASKING = {
 
 
 def test_both_sides_have_the_same_names() -> None:
-    given = {name for name in vars(system) if not name.startswith("_")}
-    given -= {"sys", "posix", "windows", "grant"}
+    names = {name for name in vars(system) if not name.startswith("_")}
+    names -= {"sys", "posix", "windows", "grant"}
     for side in (posix, windows):
-        assert not [name for name in given if not hasattr(side, name)]
+        assert not [name for name in names if not hasattr(side, name)]
 
 
 def test_nothing_else_asks_which_system_it_is_on() -> None:
@@ -52,12 +52,12 @@ def test_nothing_else_asks_which_system_it_is_on() -> None:
             of_one = {name.split(".")[0] for name in names} & (POSIX_ALONE | WINDOWS_ALONE)
             assert not of_one, f"{path}: {of_one}"
             if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
-                owner, told = node.value.id, f"{path}: {node.value.id}.{node.attr}"
+                owner, message = node.value.id, f"{path}: {node.value.id}.{node.attr}"
                 # Steps of 15.6 ms on Windows; processes that watch each other need one clock.
                 clock = (owner, node.attr) == ("time", "monotonic")
-                assert not (clock and "hardware" in path.parts), told
+                assert not (clock and "hardware" in path.parts), message
                 assert owner not in ("os", "sys", "signal", "ctypes") or node.attr not in ASKING, (
-                    told
+                    message
                 )
 
 
@@ -91,7 +91,7 @@ sys.modules["msvcrt"] = msvcrt
 sys.platform = "win32"
 import rigtwin
 from rigtwin import system
-assert system._here.__name__ == "rigtwin.system.windows"
+assert system._platform.__name__ == "rigtwin.system.windows"
 import_all()
 ran = rigtwin.run("emps", "positioning", settings={"timing": {"duration": 2.0}}, path=sys.argv[1])
 assert rigtwin.load(sys.argv[1]).ticks == ran.ticks
@@ -121,8 +121,10 @@ class Call:
     def __init__(self, act: Callable[..., Any]) -> None:
         self.act, self.restype = act, ctypes.c_int
 
-    def __call__(self, *given: Any) -> Any:
-        return self.act(*(one.value if isinstance(one, ctypes.c_void_p) else one for one in given))
+    def __call__(self, *arguments: Any) -> Any:
+        return self.act(
+            *(one.value if isinstance(one, ctypes.c_void_p) else one for one in arguments)
+        )
 
 
 class Kernel:
@@ -249,10 +251,10 @@ def test_windows_reads_keys_and_locks_files(
 
     def locking(handle: int, mode: int, size: int) -> None:
         assert (mode, size) == (2, 1)
-        here = os.fstat(handle).st_ino
-        if here in locked:
+        inode = os.fstat(handle).st_ino
+        if inode in locked:
             raise OSError(36, "Resource deadlock avoided")
-        locked[here] = os.lseek(handle, 0, os.SEEK_CUR), size
+        locked[inode] = os.lseek(handle, 0, os.SEEK_CUR), size
 
     console.LK_NBLCK, console.locking = 2, locking  # type: ignore[attr-defined]
     console.kbhit, console.getwch = lambda: bool(waiting), waiting.pop  # type: ignore[attr-defined]

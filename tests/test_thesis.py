@@ -37,7 +37,7 @@ from experiments.thesis.study import Conclusion, Drawing, Study, sheet
 from experiments.thesis.work import run_studies
 from rigtwin.cli import main
 from rigtwin.errors import RigtwinError
-from rigtwin.studies.sweep.workers import Here
+from rigtwin.studies.sweep.workers import SerialExecutor
 
 
 @pytest.mark.parametrize(
@@ -138,12 +138,12 @@ def test_finished_jobs_are_not_run_again(tmp_path, monkeypatch):
     study, ran = counting(set(), monkeypatch)
     steps: list[tuple[int, int]] = []
     first = run_studies(
-        [study], 3, tmp_path, Here(), lambda count, total: steps.append((count, total))
+        [study], 3, tmp_path, SerialExecutor(), lambda count, total: steps.append((count, total))
     )
     assert sorted(ran) == ["job/0", "job/1", "job/2"]
     assert steps[0] == (0, 3)
     assert steps[-1] == (3, 3)
-    again = run_studies([study], 4, tmp_path, Here())
+    again = run_studies([study], 4, tmp_path, SerialExecutor())
     assert sorted(ran) == ["job/0", "job/1", "job/2", "job/3"]
     assert np.array_equal(again["counted"]["job/1"]["curve"], first["counted"]["job/1"]["curve"])
 
@@ -151,18 +151,17 @@ def test_finished_jobs_are_not_run_again(tmp_path, monkeypatch):
 def test_an_interrupted_run_resumes(tmp_path, monkeypatch):
     study, ran = counting({"job/2"}, monkeypatch)
     with pytest.raises(RigtwinError, match="job/2 failed"):
-        run_studies([study], 3, tmp_path, Here())
+        run_studies([study], 3, tmp_path, SerialExecutor())
     assert ran == ["job/0", "job/1", "job/2"]
     whole, ran = counting(set(), monkeypatch)
-    assert len(run_studies([whole], 3, tmp_path, Here())["counted"]) == 3
+    assert len(run_studies([whole], 3, tmp_path, SerialExecutor())["counted"]) == 3
     assert ran == ["job/2"]
 
 
 def test_text_document_and_page_agree(tmp_path, monkeypatch):
     study, _ = counting(set(), monkeypatch)
-    chapters = [
-        Chapter(study, study.conclude(run_studies([study], 3, tmp_path, Here())["counted"]))
-    ]
+    results = run_studies([study], 3, tmp_path, SerialExecutor())
+    chapters = [Chapter(study, study.conclude(results["counted"]))]
     plain = text(chapters, every=True)
     assert "1 of 1 entries agree" in plain
     assert "[1] a note" in plain

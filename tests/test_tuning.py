@@ -26,21 +26,21 @@ from rigtwin.errors import RigtwinError
 from rigtwin.recording import load
 from rigtwin.simulation.experiment import Experiment
 from rigtwin.studies.sweep import Store
-from rigtwin.studies.sweep.workers import Here
+from rigtwin.studies.sweep.workers import SerialExecutor
 from rigtwin.studies.tuning.bench import Bench, Score, quantile
 from rigtwin.studies.tuning.evaluation import compare, median_interval
 from rigtwin.studies.tuning.measures import MEASURES, Trial
-from rigtwin.studies.tuning.parameter import Parameter, values_at
+from rigtwin.studies.tuning.parameter import TuningParameter, values_at
 from rigtwin.studies.tuning.run import LIMITS, TRIP, Run, rig_trial, run
 from rigtwin.studies.tuning.scenario import (
     APART,
     NOMINAL,
-    Rig,
     Scenario,
+    UncertainRig,
     calibrated_rig,
     draw_scenarios,
 )
-from rigtwin.studies.tuning.search import Candidate, Search, bound_of, find_best, find_front
+from rigtwin.studies.tuning.search import Candidate, TuningSearch, bound_of, find_best, find_front
 from rigtwin.studies.tuning.study import Constraint, Study
 from rigtwin.studies.tuning.study_file import parse_study
 from tests.helpers.browser import BROWSER, looked_at
@@ -79,7 +79,7 @@ def read(tables: dict[str, object]) -> Study:
     return parse_study("s", tables, find(DEFAULT_MACHINE))
 
 
-def draw_frictions(study: Study, rig: Rig, count: int) -> np.ndarray:
+def draw_frictions(study: Study, rig: UncertainRig, count: int) -> np.ndarray:
     """The motor's dry friction in scenarios, N."""
     return np.array([each.plant.motor.coulomb for each in draw_scenarios(study, rig, count, 0)])
 
@@ -107,7 +107,7 @@ def rig_run(
 
 
 def figure(name: str, test: Trial) -> float:
-    return MEASURES[name].of(test)
+    return MEASURES[name].compute(test)
 
 
 def test_measures_of_sines():
@@ -148,19 +148,19 @@ KINDS_OF_TEST = ("drop", "semi-active", "friction-road", "imposed")
 def test_every_measure_is_a_number_for_every_kind_of_test(name):
     short = {"timing": {"duration": 2.0, "timestep": 1e-3}}
     configuration = override(experiment(name).configuration, short)
-    found = run(rig_run(experiment(name), configuration, 0, 0.5, tuple(MEASURES)))
-    assert set(found) == {*MEASURES, LIMITS, TRIP}
-    assert all(map(math.isfinite, found.values()))
-    assert 0.0 < found[LIMITS] < 1.0
+    figures = run(rig_run(experiment(name), configuration, 0, 0.5, tuple(MEASURES)))
+    assert set(figures) == {*MEASURES, LIMITS, TRIP}
+    assert all(map(math.isfinite, figures.values()))
+    assert 0.0 < figures[LIMITS] < 1.0
 
 
 def test_a_run_that_trips_has_no_measures():
     tight = {"timing": {"duration": 1.0}, "safety": {"force": 150.0}}
     configuration = override(Configuration(), tight)
-    found = run(rig_run(experiment("drop"), configuration, 0, 0.0, ("ride",)))
-    assert found[TRIP] != 0.0
-    assert math.isnan(found["ride"])
-    assert found[LIMITS] > 1.0
+    figures = run(rig_run(experiment("drop"), configuration, 0, 0.0, ("ride",)))
+    assert figures[TRIP] != 0.0
+    assert math.isnan(figures["ride"])
+    assert figures[LIMITS] > 1.0
 
 
 def test_errors_are_those_of_the_thesis_tables():
@@ -168,23 +168,23 @@ def test_errors_are_those_of_the_thesis_tables():
     from rigtwin.simulation.runner import record
 
     configuration = override(Configuration(), {"timing": {"duration": 3.0}})
-    found = run(rig_run(experiment("drop"), configuration, 4, 0.0, tuple(MEASURES)))
+    figures = run(rig_run(experiment("drop"), configuration, 4, 0.0, tuple(MEASURES)))
     import tempfile
 
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "r.mcap"
         record(path, "drop", configuration, experiment("drop").demands(configuration, 4), 4)
         expected = tracking_of(load(path), configuration)
-    assert found["tracking"] == pytest.approx(expected.force_e2, rel=1e-12)
+    assert figures["tracking"] == pytest.approx(expected.force_e2, rel=1e-12)
     force = expected.force_e1 + expected.force_e2
     position = expected.position_e1 + expected.position_e2
-    assert found["force_error"] == pytest.approx(force, rel=1e-12)
-    assert found["position_error"] == pytest.approx(position, rel=1e-12)
+    assert figures["force_error"] == pytest.approx(force, rel=1e-12)
+    assert figures["position_error"] == pytest.approx(position, rel=1e-12)
 
 
 @pytest.mark.parametrize("logarithmic", [False, True])
 def test_a_parameter_goes_there_and_back(logarithmic):
-    parameter = Parameter("controller.ki", 2.0, 300.0, logarithmic, "1/s")
+    parameter = TuningParameter("controller.ki", 2.0, 300.0, logarithmic, "1/s")
     assert parameter.value(0.0) == 2.0
     assert parameter.value(1.0) == 300.0
     for share in np.linspace(0, 1, 11):
@@ -205,9 +205,9 @@ def test_every_study_that_comes_along_can_be_read(tmp_path):
         assert study.parameters
         assert study.title != name
         for parameter in study.parameters:
-            there = getattr(study.baseline_settings, parameter.name)
-            assert parameter.low <= there <= parameter.high, parameter.key
-        bench = Bench(study, Store(tmp_path / f"{name}.sqlite"), Here())
+            value = getattr(study.baseline_settings, parameter.name)
+            assert parameter.low <= value <= parameter.high, parameter.key
+        bench = Bench(study, Store(tmp_path / f"{name}.sqlite"), SerialExecutor())
         short = override(study.search_configuration, {"timing": {"duration": 1.0}})
         scenario = Scenario(0, short.plant)
         assert run(replace(bench.plan(short, study.baseline_settings, scenario), first=0.0))
@@ -218,7 +218,7 @@ def test_every_study_that_comes_along_can_be_read(tmp_path):
     [
         ({"nothing": 1}, "unknown 'nothing'"),
         ({"experiment": "moon"}, "unknown experiment"),
-        ({"minimise": "beauty"}, "unknown 'beauty'; there are ride"),
+        ({"minimise": "beauty"}, "unknown 'beauty'; expected ride"),
         ({"minimise": ["ride", "heave", "travel"]}, "one objective, or two"),
         ({"minimise": 3}, "expected names of"),
         ({"parameters": {}}, "expected settings with bounds"),
@@ -253,7 +253,7 @@ def test_every_study_that_comes_along_can_be_read(tmp_path):
         ({"set": {"duration": 2.0}}, "set: duration = 2.0: expected group.name"),
         ({"judge": {"odd": 3}}, "judge: odd = 3: expected a table"),
         ({"vary": {"rail.viscous": 0.5}}, "it is 0 in this machine"),
-        ({"minimise": ["ride", "ride"]}, "one objective, or two others"),
+        ({"minimise": ["ride", "ride"]}, "one objective, or two different ones"),
     ],
 )
 def test_mistakes_in_a_study_are_one_line(changes, says):
@@ -370,50 +370,56 @@ class Known(Bench):
     """A bench that knows: ride is least at 700 Ns/m and kp 1.3; road holding at 300 Ns/m."""
 
     def score(self, candidates, scenarios) -> list[Score]:
-        found = []
-        for one in candidates:
-            ride = 1.0 + ((one.skyhook_damping - 700.0) / 500.0) ** 2 + (one.kp - 1.3) ** 2
-            holding = 2.0 + ((one.skyhook_damping - 300.0) / 500.0) ** 2 + (one.kp - 1.3) ** 2
-            trips = 0.0 if one.kp < 1.8 else 0.5
+        tried = []
+        for candidate in candidates:
+            ride = (
+                1.0 + ((candidate.skyhook_damping - 700.0) / 500.0) ** 2 + (candidate.kp - 1.3) ** 2
+            )
+            holding = (
+                2.0 + ((candidate.skyhook_damping - 300.0) / 500.0) ** 2 + (candidate.kp - 1.3) ** 2
+            )
+            trips = 0.0 if candidate.kp < 1.8 else 0.5
             figures = {"ride": ride, "road_holding": holding}
-            found.append(Score(dict.fromkeys(figures, math.nan) if trips else figures, 0.5, trips))
+            tried.append(Score(dict.fromkeys(figures, math.nan) if trips else figures, 0.5, trips))
             self.progress(1)
-        return found
+        return tried
 
 
-def make_search(tmp_path: Path, tables: dict[str, object], progress=lambda _: None) -> Search:
+def make_search(tmp_path: Path, tables: dict[str, object], progress=lambda _: None) -> TuningSearch:
     parameters = {"controller.skyhook_damping": [50.0, 1500.0], "controller.kp": [0.1, 2.0]}
     study = read({**TABLES, "parameters": parameters, "evaluations": 400, **tables})
-    return Search(Known(study, Store(tmp_path / "s.sqlite"), Here(), progress), [], 1)
+    return TuningSearch(
+        Known(study, Store(tmp_path / "s.sqlite"), SerialExecutor(), progress), [], 1
+    )
 
 
 def test_the_best_is_found(tmp_path):
-    found = find_best(make_search(tmp_path, {}))
-    assert found.values == pytest.approx((700.0, 1.3), rel=0.05)
-    assert found.score.figures["ride"] == pytest.approx(1.0, abs=0.01)
+    best = find_best(make_search(tmp_path, {}))
+    assert best.values == pytest.approx((700.0, 1.3), rel=0.05)
+    assert best.score.figures["ride"] == pytest.approx(1.0, abs=0.01)
 
 
 def test_the_best_within_a_constraint_is_found(tmp_path):
     """On the circle about (300, 1.3) of radius 0.4 in shares of 500: 500 Ns/m."""
-    found = find_best(make_search(tmp_path, {"constraints": {"road_holding": 2.16}}))
-    assert found.allowed
-    assert found.values == pytest.approx((500.0, 1.3), rel=0.05)
-    assert found.score.figures["ride"] == pytest.approx(1.16, abs=0.01)
+    best = find_best(make_search(tmp_path, {"constraints": {"road_holding": 2.16}}))
+    assert best.allowed
+    assert best.values == pytest.approx((500.0, 1.3), rel=0.05)
+    assert best.score.figures["ride"] == pytest.approx(1.16, abs=0.01)
 
 
 def test_what_trips_is_never_chosen(tmp_path):
     parameters = {"controller.skyhook_damping": [600, 800], "controller.kp": [1.5, 2.0]}
     search = make_search(tmp_path, {"parameters": parameters})
-    found = find_best(search)
-    assert found.values[1] < 1.8
+    best = find_best(search)
+    assert best.values[1] < 1.8
     assert any(each.score.trips for each in search.candidates.values())
 
 
 def test_a_bound_may_be_the_baselines(tmp_path):
     search = make_search(tmp_path, {"constraints": {"road_holding": "0.9 baseline"}})
-    there = search.baseline.figures["road_holding"]
-    assert search.bounds == [pytest.approx(0.9 * there)]
-    assert find_best(search).score.figures["road_holding"] <= 0.9 * there
+    figure = search.baseline.figures["road_holding"]
+    assert search.bounds == [pytest.approx(0.9 * figure)]
+    assert find_best(search).score.figures["road_holding"] <= 0.9 * figure
 
 
 def test_there_is_no_share_of_a_baseline_below_zero():
@@ -437,7 +443,7 @@ def test_parameters_that_do_nothing_are_said(tmp_path):
 
     study = read({**TABLES, "evaluations": 10})
     with pytest.raises(RigtwinError, match="skyhook_damping make no difference in active"):
-        find_best(Search(Deaf(study, Store(tmp_path / "s.sqlite"), Here()), [], 1))
+        find_best(TuningSearch(Deaf(study, Store(tmp_path / "s.sqlite"), SerialExecutor()), [], 1))
 
 
 def test_what_is_not_a_number_is_not_allowed(tmp_path):
@@ -448,7 +454,7 @@ def test_what_is_not_a_number_is_not_allowed(tmp_path):
 
     study = read({**TABLES, "evaluations": 10})
     with pytest.raises(RigtwinError, match="the nearest fails at trips"):
-        find_best(Search(Lost(study, Store(tmp_path / "s.sqlite"), Here()), [], 1))
+        find_best(TuningSearch(Lost(study, Store(tmp_path / "s.sqlite"), SerialExecutor()), [], 1))
 
 
 @pytest.mark.parametrize("evaluations", [5, 20, 100])
@@ -471,27 +477,27 @@ def test_nothing_allowed_is_said(tmp_path):
 def test_a_front_is_the_line_between_both_best(tmp_path):
     tables = {"minimise": ["ride", "road_holding"], "points": 6, "evaluations": 600}
     search = make_search(tmp_path, tables)
-    found = find_front(search)
-    assert len(found) > 6
-    for one, next_one in pairwise(found):
-        assert one.score.figures["ride"] <= next_one.score.figures["ride"]
-        assert one.score.figures["road_holding"] > next_one.score.figures["road_holding"]
+    front = find_front(search)
+    assert len(front) > 6
+    for point, next_one in pairwise(front):
+        assert point.score.figures["ride"] <= next_one.score.figures["ride"]
+        assert point.score.figures["road_holding"] > next_one.score.figures["road_holding"]
     # Between 300 and 700 Ns/m at kp 1.3, √(ride − 1) + √(holding − 2) = 0.8 on the true front.
-    for each in found:
-        ride, holding = each.score.figures["ride"], each.score.figures["road_holding"]
+    for point in front:
+        ride, holding = point.score.figures["ride"], point.score.figures["road_holding"]
         short = math.sqrt(ride - 1.0) + math.sqrt(holding - 2.0)
         assert 0.8 - 1e-9 <= short < 1.0
-    damping = [each.values[0] for each in found]
+    damping = [point.values[0] for point in front]
     assert max(damping) > 650.0
     assert min(damping) < 350.0
 
 
 def test_a_search_goes_the_same_way_again(tmp_path):
-    one, again = (list(_all(make_search(tmp_path / name, {}))) for name in ("a", "b"))
-    assert one == again
+    first, again = (list(_all(make_search(tmp_path / name, {}))) for name in ("a", "b"))
+    assert first == again
 
 
-def _all(search: Search) -> dict[tuple[float, ...], Candidate]:
+def _all(search: TuningSearch) -> dict[tuple[float, ...], Candidate]:
     find_best(search)
     return search.candidates
 
@@ -526,10 +532,10 @@ def test_a_comparison_is_paired_and_leaves_trips_out():
 
     before = rows((1.0, 1.0, 0), (2.0, 1.0, 0), (4.0, 1.0, 0), (math.nan, 1.0, 1))
     after = rows((0.5, 1.5, 0), (1.0, 0.5, 0), (3.0, 2.0, 0), (1.0, 1.0, 0))
-    found = compare(measures, "rig", ("before", before), ("tuned", after))
-    assert found.runs == 3
-    assert found.trips == (0.25, 0.0)
-    ride, margin = found.of("ride"), found.of("stability_margin")
+    comparison = compare(measures, "rig", ("before", before), ("tuned", after))
+    assert comparison.runs == 3
+    assert comparison.trips == (0.25, 0.0)
+    ride, margin = comparison.change_of("ride"), comparison.change_of("stability_margin")
     assert ride.median == pytest.approx(-50.0)
     assert ride.better == 1.0
     assert margin.median == pytest.approx(0.5)
@@ -541,8 +547,10 @@ def test_a_change_of_nothing_is_in_its_unit():
     def rows(values: list[float]) -> list[dict[str, float]]:
         return [{"travel": value, TRIP: 0.0, LIMITS: 0.1} for value in values]
 
-    one, other = rows([0.0] * 6), rows([0.1] * 6)
-    change = compare((MEASURES["travel"],), "rig", ("before", one), ("tuned", other)).of("travel")
+    before, after = rows([0.0] * 6), rows([0.1] * 6)
+    change = compare((MEASURES["travel"],), "rig", ("before", before), ("tuned", after)).change_of(
+        "travel"
+    )
     assert not change.relative
     assert change.median == pytest.approx(0.1)
 
@@ -697,8 +705,8 @@ def test_mistakes_on_the_command_line_are_one_line(arguments, says, tmp_path, mo
 
 def test_settings_are_compared_with_those_of_the_study():
     study = read({**TABLES, "baseline": {"controller.skyhook": "none"}})
-    own = study.configuration.controller
-    assert study.baseline_settings == own._replace(skyhook=Settings().skyhook)
+    settings = study.configuration.controller
+    assert study.baseline_settings == settings._replace(skyhook=Settings().skyhook)
     assert values_at(study.parameters, np.array([0.5])) == (775.0,)
 
 

@@ -60,13 +60,13 @@ def test_a_nominal_test_gives_no_alarm(nominal):
 
 @pytest.mark.slow
 def test_an_effect_from_a_time_on_gives_an_alarm_and_its_name(changed):
-    told: list[tuple[float, bool]] = []
-    watch = rigtwin.watch(changed, told=lambda now: told.append((now.judged, now.alarm is None)))
+    updates: list[tuple[float, bool]] = []
+    watch = rigtwin.watch(changed, told=lambda now: updates.append((now.judged, now.alarm is None)))
     alarm = watch.alarm
     assert alarm is not None
     assert LATER < alarm.time < LATER + 1.0
     assert alarm.since == pytest.approx(LATER, abs=0.6)
-    assert all(calm for judged, calm in told if judged < LATER)
+    assert all(calm for judged, calm in updates if judged < LATER)
     assert alarm.suspects[0].effect == EFFECT[0]
     assert alarm.suspects[0].values["coulomb"] == pytest.approx(EFFECT[1], rel=0.1)
     assert sum(each.probability for each in alarm.suspects) <= 1.0 + 1e-9
@@ -91,18 +91,18 @@ def test_up_to_when_an_effect_begins_a_run_is_the_nominal_one(nominal, changed):
     assert early.sum() > 5000
     for topic, columns in before.columns.items():
         for name, values in columns.items():
-            other = after.columns[topic][name]
-            np.testing.assert_array_equal(values[early], other[early], err_msg=name)
-    travel, same = (
+            expected = after.columns[topic][name]
+            np.testing.assert_array_equal(values[early], expected[early], err_msg=name)
+    travel, identical = (
         after.column("/truth", "suspension"),
         before.column("/truth", "suspension"),
     )
-    here = int(early.sum())
+    count_early = int(early.sum())
     # A rig that changes its friction does not jump.
-    assert np.max(np.abs(np.diff(travel[here - 5 : here + 5]))) < 2.0 * np.max(
-        np.abs(np.diff(same))
+    assert np.max(np.abs(np.diff(travel[count_early - 5 : count_early + 5]))) < 2.0 * np.max(
+        np.abs(np.diff(identical))
     )
-    assert np.max(np.abs(travel - same)) > 1e-4
+    assert np.max(np.abs(travel - identical)) > 1e-4
     assert float(after.twin["effects_from"]) == LATER
     assert "effects_from" not in before.twin
 
@@ -222,11 +222,11 @@ def test_a_damaged_stretch_does_not_end_the_watch(nominal, tmp_path):
 
 
 def test_it_can_be_stopped(nominal):
-    told: list[float] = []
+    updates: list[float] = []
     watch = rigtwin.watch(
-        nominal, told=lambda now: told.append(now.judged), stop=lambda: len(told) > 2
+        nominal, told=lambda now: updates.append(now.judged), stop=lambda: len(updates) > 2
     )
-    assert len(told) == 3
+    assert len(updates) == 3
     assert watch.judged < 6.0
 
 
@@ -246,12 +246,12 @@ def test_a_shorter_stretch_is_its_end(nominal):
 
 
 def without(recording: rigtwin.Recording, missing: np.ndarray) -> rigtwin.Recording:
-    left = np.setdiff1d(np.arange(recording.ticks), missing)
+    recorded = np.setdiff1d(np.arange(recording.ticks), missing)
     columns = {
-        topic: {name: values[left] for name, values in names.items()}
+        topic: {name: values[recorded] for name, values in names.items()}
         for topic, names in recording.columns.items()
     }
-    return dataclasses.replace(recording, time=recording.time[left], columns=columns)
+    return dataclasses.replace(recording, time=recording.time[recorded], columns=columns)
 
 
 def test_missed_ticks_are_filled_in_and_not_judged(nominal):
@@ -263,9 +263,9 @@ def test_missed_ticks_are_filled_in_and_not_judged(nominal):
     command = mended.column("/command", "structure")
     np.testing.assert_array_equal(command[3000:3003], whole.column("/command", "structure")[2999])
     cell = whole.column("/sensor", "load_cell")
-    there = mended.column("/sensor", "load_cell")
-    np.testing.assert_array_equal(there[recorded], cell[recorded])
-    assert there[7000] == pytest.approx(0.5 * (cell[6999] + cell[7001]))
+    filled = mended.column("/sensor", "load_cell")
+    np.testing.assert_array_equal(filled[recorded], cell[recorded])
+    assert filled[7000] == pytest.approx(0.5 * (cell[6999] + cell[7001]))
 
 
 def test_after_a_long_gap_it_begins_anew(nominal):
@@ -293,8 +293,8 @@ def test_a_cusum_stays_low_under_what_is_explained_and_rises_under_more():
         taken += 1
         gap.add(RATIO * float(np.sum(random.normal(size=count) ** 2)), count, float(taken))
     # Each block adds the divergence of the two distributions.
-    each = 0.5 * count * (RATIO - 1.0 - math.log(RATIO))
-    assert taken == pytest.approx(LIMIT / each, abs=3)
+    gain = 0.5 * count * (RATIO - 1.0 - math.log(RATIO))
+    assert taken == pytest.approx(LIMIT / gain, abs=3)
     assert gap.since == 0.0
 
 

@@ -18,9 +18,9 @@ from rigtwin.description.configuration import Configuration
 from rigtwin.description.effects import apply_effects
 from rigtwin.description.machine import Machine
 from rigtwin.errors import RigtwinError
-from rigtwin.files import write_whole
+from rigtwin.files import atomic_write
 from rigtwin.hardware.daq.calibration import (
-    Still,
+    RestReading,
     correct_signs,
     set_spans,
     set_zeros,
@@ -48,7 +48,7 @@ class TableCheck:
     what was changed, a line each."""
 
     table: ChannelTable
-    rest: tuple[Still, ...]
+    rest: tuple[RestReading, ...]
     said: tuple[str, ...]
 
 
@@ -158,7 +158,7 @@ def check_card(
     ask: Callable[[str], int] | None = None,
     virtual: str | Path | None = None,
     stop: Callable[[], str | None] | None = None,
-    show: Callable[[tuple[Still, ...]], object] = lambda _: None,
+    show: Callable[[tuple[RestReading, ...]], object] = lambda _: None,
 ) -> TableCheck:
     """Finds zero, span and signs of a channel table on the rig as it stands.
 
@@ -229,7 +229,7 @@ def check_card(
         return ask(output)
 
     said: tuple[str, ...] = ()
-    still: tuple[Still, ...] = ()
+    still: tuple[RestReading, ...] = ()
     found = table
     if signs:
         if wiring is None and not arm():
@@ -249,7 +249,7 @@ def check_card(
 
 def write_table(table: ChannelTable, path: str | Path) -> None:
     """Writes a channel table. Raises RigtwinError if it cannot."""
-    write_whole(Path(path), to_toml(table))
+    atomic_write(Path(path), to_toml(table))
 
 
 def _require_values(values: Mapping[str, float], option: str, table: ChannelTable) -> None:

@@ -16,7 +16,7 @@ from rigtwin.api.recordings import the_recording
 from rigtwin.console import finite
 from rigtwin.description.machine import Machine
 from rigtwin.errors import RigtwinError
-from rigtwin.files import printable, write_whole
+from rigtwin.files import atomic_write, printable
 from rigtwin.studies.sweep import Store, open_workers, run_jobs
 from rigtwin.system import return_memory
 
@@ -171,7 +171,7 @@ def diagnose_each(
         str(each.path): {"error": each.error} if each.document is None else each.document
         for each in answers
     }
-    write_whole(out / TABLE, json.dumps(table, indent=1, allow_nan=False) + "\n")
+    atomic_write(out / TABLE, json.dumps(table, indent=1, allow_nan=False) + "\n")
     return answers
 
 

@@ -15,10 +15,10 @@ from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq import CARD
 from rigtwin.hardware.daq.card import require_client
 from rigtwin.hardware.daq.table import load_table
-from rigtwin.hardware.faults.campaign import Fault, FaultResult, draw_faults, try_fault
+from rigtwin.hardware.faults.campaign import FaultResult, InjectedFault, draw_faults, try_fault
 from rigtwin.hardware.faults.kinds import KINDS
 from rigtwin.hardware.faults.processes import try_process_fault
-from rigtwin.hardware.session.own_controller import Making, own_controller
+from rigtwin.hardware.session.custom_controller import ControllerFactory, custom_controller
 
 MOST = 1000
 
@@ -45,7 +45,7 @@ def faults(
     each: int = 11,
     processes: int = 4,
     card: str | Path = CARD,
-    controller: Making | None = None,
+    controller: ControllerFactory | None = None,
     settings: Settings = (),
     progress: Callable[[str, int, int], object] = lambda *_: None,
 ) -> Campaign:
@@ -83,7 +83,7 @@ def faults(
     if each == processes == 0:
         raise RigtwinError("each 0, processes 0: no session to run; expected 1 or more of one")
     channels = load_table(Path(card))
-    own = None if controller is None else own_controller(controller)
+    own = None if controller is None else custom_controller(controller)
     todo = _draw(seed, each, processes)
     tests = {
         name: replace(found, configuration=with_changes(found.configuration, settings))
@@ -110,7 +110,7 @@ def faults(
     return Campaign(tuple(results), tuple(undone), len(todo), interrupted)
 
 
-def _draw(seed: int, each: int, processes: int) -> list[Fault]:
+def _draw(seed: int, each: int, processes: int) -> list[InjectedFault]:
     here = [kind for kind in KINDS if kind.place != "process"]
     apart = [kind for kind in KINDS if kind.place == "process"]
     return [

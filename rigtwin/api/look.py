@@ -13,7 +13,7 @@ from rigtwin.api.watching import PATIENCE, watch
 from rigtwin.description.machine import Machine
 from rigtwin.errors import RigtwinError
 from rigtwin.looking import Look
-from rigtwin.looking.given import read_answer, take_alarm
+from rigtwin.looking.starting_point import from_alarm, read_diagnosis
 from rigtwin.recording import reader
 from rigtwin.watching import Watch
 
@@ -88,7 +88,7 @@ def show_look(
     RigtwinError
         If the port is taken, the diagnosis is none of this recording, or viser is missing.
     """
-    given = None if diagnosis is None else read_answer(diagnosis, look)
+    given = None if diagnosis is None else read_diagnosis(diagnosis, look)
     with _needs_viser():
         from rigtwin.looking.local_server import open_server
         from rigtwin.looking.page import Page
@@ -139,13 +139,13 @@ def show_live(
         from rigtwin.looking.local_server import LocalServer, open_server
         from rigtwin.looking.page import Page
 
-    def follow(told: Callable[[Watch], object], stop: Callable[[], bool]) -> Watch:
+    def follow(on_update: Callable[[Watch], object], stop: Callable[[], bool]) -> Watch:
         return watch(
             path,
             machine=machine,
             settings=settings,
             without=without,
-            told=told,
+            told=on_update,
             patience=patience,
             stop=stop,
         )
@@ -154,7 +154,7 @@ def show_live(
         whole = look(
             load(path, machine), machine=watched.machine, settings=settings, without=without
         )
-        given = None if watched.alarm is None else take_alarm(watched.alarm, whole)
+        given = None if watched.alarm is None else from_alarm(watched.alarm, whole)
         return Page(server, whole, given, _twin_file(Path(path), save_twin))
 
     return LivePage(open_server(port, Path(path).name), follow, look_back, said)

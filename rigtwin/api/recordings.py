@@ -14,7 +14,7 @@ from rigtwin.api.machines import Settings, machine, machine_of, the_machine, twi
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Machine
 from rigtwin.errors import RigtwinError
-from rigtwin.files import keep_apart
+from rigtwin.files import forbid_overwriting
 from rigtwin.importing.convert import Data, convert, convert_episodes
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import export, reader
@@ -68,7 +68,7 @@ class Recording(reader.Recording):
         from rigtwin.render.plot import draw  # Late: matplotlib takes a second.
         from rigtwin.render.style import find_style
 
-        draw(self, keep_apart(out, self.path), start, until, find_style(style), panels)
+        draw(self, forbid_overwriting(out, self.path), start, until, find_style(style), panels)
         return Path(out)
 
     def video(
@@ -106,12 +106,12 @@ class Recording(reader.Recording):
             raise RigtwinError(f"a ghost's gap {ghost:g} times as large; expected 0 or more")
         if ghost:
             options["ghost"] = _ghost(self, machine, twin_of(machine, settings, ()), ghost)
-        film(self, keep_apart(out, self.path, *machine.files), machine, **options)
+        film(self, forbid_overwriting(out, self.path, *machine.files), machine, **options)
         return Path(out)
 
     def export(self, out: str | Path) -> Path:
         """Writes it as csv or mat, by the name's ending. Raises RigtwinError for any other."""
-        export.export(self, keep_apart(out, self.path))
+        export.export(self, forbid_overwriting(out, self.path))
         return Path(out)
 
     @property

@@ -15,7 +15,7 @@ from rigtwin.description.changes import with_changes
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Machine
 from rigtwin.errors import RigtwinError
-from rigtwin.files import keep_apart, recordable
+from rigtwin.files import forbid_overwriting, recordable
 from rigtwin.recording import reader
 from rigtwin.simulation.experiment import Demands, Experiment, find_experiment
 from rigtwin.simulation.loop import TickController
@@ -103,7 +103,7 @@ def run(
         )
 
     if path is not None:
-        work(recordable(keep_apart(path, *on.files)))
+        work(recordable(forbid_overwriting(path, *on.files)))
         return faced(reader.load(Path(path)), on)
     with TemporaryDirectory(prefix="rigtwin-") as folder:
         kept = Path(folder) / f"{test.name}-{seed}.mcap"

@@ -22,14 +22,14 @@ from rigtwin.files import recordable
 from rigtwin.hardware.daq import CARD
 from rigtwin.hardware.daq.table import load_table
 from rigtwin.hardware.daq.wired import InRealTime, WiredTwin
-from rigtwin.hardware.session.dry_run import enter
-from rigtwin.hardware.session.own_controller import Making, own_controller
+from rigtwin.hardware.session.custom_controller import ControllerFactory, custom_controller
+from rigtwin.hardware.session.dry_run import add_dry_run
 from rigtwin.hardware.session.permission import key_of, list_obstacles, require_permission
 from rigtwin.hardware.session.plan import PlannedTest, is_complete, move_aside, parse_plan
 from rigtwin.hardware.session.record import (
     open_virtual_card,
-    record_at_leisure,
     record_in_real_time,
+    record_unpaced,
 )
 from rigtwin.hardware.session.stops import stop_requests
 from rigtwin.hardware.session.test import AnyTest
@@ -88,7 +88,7 @@ def plan_test(
     settings: Settings = (),
     seed: int = 0,
     effects: Effects = (),
-    controller: Making | None = None,
+    controller: ControllerFactory | None = None,
 ) -> AnyTest:
     """A test ready to be run under supervision.
 
@@ -121,7 +121,7 @@ def plan_test(
     on = the_machine(machine)
     found = find_experiment(on, experiment)
     configuration = check_settings(on, found.configuration, settings)
-    own = None if controller is None else own_controller(controller)
+    own = None if controller is None else custom_controller(controller)
     told = tuple(effect_texts(effects))
     physics = on.physics
     path = physics.card if card is None else Path(card)
@@ -147,7 +147,7 @@ def dry_run(
     machine: Machine | str | Path = DEFAULT_MACHINE,
     settings: Settings = (),
     seed: int = 0,
-    controller: Making | None = None,
+    controller: ControllerFactory | None = None,
     effects: Effects = (),
     progress: Callable[[int], object] = lambda _: None,
     stop: Stop | None = None,
@@ -186,7 +186,7 @@ def dry_run(
     )
     virtual, _ = open_virtual_card(test)
     with _stopped_by(stop, stop_file) as asked:
-        ended = record_at_leisure(virtual, test, Path(path), asked, progress)
+        ended = record_unpaced(virtual, test, Path(path), asked, progress)
     recording = load(Path(path)) if ended.ticks else None
     passed = ended.cause == COMPLETED
     peaks = test.predict_peaks(recording) if recording is not None else ()
@@ -194,7 +194,7 @@ def dry_run(
     shipped = Path(card).resolve().parent == CARD.resolve().parent
     if passed and not test.effects and not shipped:
         said = {"experiment": test.experiment, "date": date.today().isoformat()}
-        enter(Path(card), key_of(test), said)
+        add_dry_run(Path(card), key_of(test), said)
     return DryRun(recording, ended.cause.reason, passed, peaks, list_obstacles(test))
 
 
@@ -207,7 +207,7 @@ def run_on_twin(
     real_time: bool = False,
     settings: Settings = (),
     seed: int = 0,
-    controller: Making | None = None,
+    controller: ControllerFactory | None = None,
     effects: Effects = (),
     live: int = 0,
     progress: Callable[[int], object] = lambda _: None,
@@ -254,7 +254,7 @@ def run_on_twin(
                 timed, test, recordable(path), asked, guarded=False, live=live, progress=progress
             )
         else:
-            ended = record_at_leisure(twin, test, recordable(path), asked, progress)
+            ended = record_unpaced(twin, test, recordable(path), asked, progress)
     return _result(Path(path), ended)
 
 
@@ -268,7 +268,7 @@ def run_on_card(
     without_dry_run: str | None = None,
     settings: Settings = (),
     seed: int = 0,
-    controller: Making | None = None,
+    controller: ControllerFactory | None = None,
     live: int = 0,
     progress: Callable[[int], object] = lambda _: None,
     stop: Stop | None = None,

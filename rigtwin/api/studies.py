@@ -31,7 +31,7 @@ from rigtwin.studies.stability.judgement import ModelStability as ModelStability
 from rigtwin.studies.stability.judgement import Stability, judge
 from rigtwin.studies.stability.tested import RigMargin as RigMargin
 from rigtwin.studies.stability.tested import judge_margin
-from rigtwin.studies.stability.vehicle import QuarterCar, believable, checked_time
+from rigtwin.studies.stability.vehicle import QuarterCar, check_plausible, check_time
 from rigtwin.studies.sweep import Store, open_workers
 from rigtwin.studies.tuning.bench import Bench
 from rigtwin.studies.tuning.folder import RUNS, default_folder, write
@@ -181,8 +181,8 @@ def stability(
         if name not in QuarterCar._fields:
             known = ", ".join(QuarterCar._fields)
             raise RigtwinError(f"unknown parameter {name!r} of a vehicle; there are {known}")
-    car = believable(car._replace(**(changes or {})))
-    return judge(car, checked_time("tau", tau), delay)
+    car = check_plausible(car._replace(**(changes or {})))
+    return judge(car, check_time("tau", tau), delay)
 
 
 def _car(vehicle: str | QuarterCar) -> QuarterCar:
@@ -213,7 +213,7 @@ def rig_margin(
         by = PlateCompensator.parse(compensator)
     except ValueError as error:
         raise RigtwinError(f"compensator {error}") from None
-    return judge_margin(believable(_car(vehicle)), by)
+    return judge_margin(check_plausible(_car(vehicle)), by)
 
 
 def reproduce(

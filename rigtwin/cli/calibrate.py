@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from rigtwin.console import writable
-from rigtwin.files import write_whole
+from rigtwin.files import atomic_write
 
 SUMMARY = "find the friction compensator's settings from a recording"
 MORE = """\
@@ -44,6 +44,6 @@ def execute(parsed: argparse.Namespace) -> int:
     if parsed.out is None:
         print(found.toml(), end="")
     else:
-        write_whole(parsed.out, found.toml())
+        atomic_write(parsed.out, found.toml())
         print(f"settings in {parsed.out}, for --config")
     return 0

@@ -16,7 +16,7 @@ from rigtwin.console import table, writable
 from rigtwin.errors import RigtwinError
 
 if TYPE_CHECKING:
-    from rigtwin.hardware.daq.calibration import Still
+    from rigtwin.hardware.daq.calibration import RestReading
 
 SUMMARY = "a virtual card on a port, or the check of a channel table"
 MORE = "docs/rig.md"
@@ -176,7 +176,7 @@ def _check(parsed: argparse.Namespace) -> int:
     return 0
 
 
-def _show(rest: Sequence[Still]) -> None:
+def _show(rest: Sequence[RestReading]) -> None:
     rows: list[tuple[str, ...]] = [("signal", "mean", "noise", "same in a row")]
     rows += [(s.name, f"{s.mean:.5g}", f"{s.noise:.3g} rms", str(s.repeats)) for s in rest]
     print(table(rows))

@@ -12,7 +12,7 @@ import rigtwin
 from rigtwin.cli.options import add_settings, counting_bar, settings_of
 from rigtwin.console import table, writable, write_json
 from rigtwin.errors import RigtwinError
-from rigtwin.files import write_whole
+from rigtwin.files import atomic_write
 from rigtwin.hardware.daq import CARD
 
 if TYPE_CHECKING:
@@ -157,4 +157,4 @@ def _write(
         raise RigtwinError(f"cannot read {path}, whose table is to be replaced") from None
     before, mark, _ = old.partition(MARK)
     table_only = "\n".join(lines) + "\n"
-    write_whole(path, f"{before}{MARK}\n\n{table_only.rstrip()}\n" if mark else table_only)
+    atomic_write(path, f"{before}{MARK}\n\n{table_only.rstrip()}\n" if mark else table_only)

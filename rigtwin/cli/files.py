@@ -8,7 +8,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from rigtwin.errors import RigtwinError
-from rigtwin.files import keep_apart
+from rigtwin.files import forbid_overwriting
 
 OUTPUTS = ("out", "json", "html", "pdf", "png", "draw", "save_twin", "save_mjcf")
 """Options that name a file to be written."""
@@ -25,7 +25,7 @@ def check_files(parsed: argparse.Namespace) -> None:
     seen: dict[Path, str] = {}
     for name, path in outputs.items():
         option = f"--{name.replace('_', '-')}"
-        keep_apart(path, *inputs)
+        forbid_overwriting(path, *inputs)
         if (other := seen.setdefault(path.resolve(), option)) != option:
             raise RigtwinError(f"{other} and {option} are both {path}; one would be lost")
 

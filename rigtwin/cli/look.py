@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from rigtwin.cli.options import add_machine, add_settings, settings_of
 from rigtwin.console import writable
 from rigtwin.errors import RigtwinError
-from rigtwin.files import keep_apart
+from rigtwin.files import forbid_overwriting
 
 if TYPE_CHECKING:
     from rigtwin.looking.live import LivePage
@@ -62,7 +62,9 @@ def execute(parsed: argparse.Namespace) -> int:
         raise RigtwinError("--diagnosis is of a recording that is whole; not with --live")
     out = parsed.save_twin or Path(f"{parsed.recording.stem}_twin.toml")
     writable(
-        keep_apart(out, *(each for each in (parsed.config, parsed.diagnosis) if each is not None))
+        forbid_overwriting(
+            out, *(each for each in (parsed.config, parsed.diagnosis) if each is not None)
+        )
     )
     with _page(parsed, out) as page:
         try:

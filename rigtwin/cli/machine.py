@@ -96,14 +96,14 @@ def _print_never(machine: Machine, seconds: float) -> None:
         print("never identifiable: not worked out; give its joints a range")
     for name in can.unseen:
         print(f"never identifiable: {name}; nothing that is recorded changes with it")
-    for name, others in can.alike.items():
+    for name, others in can.confounded.items():
         print(f"never identifiable alone: {name}; {' + '.join(others)} would do the same")
     if can.untried:
         print(
             f"not worked out within {seconds:g} s, --identifiability goes on: "
             f"{', '.join(can.untried)}"
         )
-    if can.motions and not can.unseen and not can.alike and not can.untried:
+    if can.motions and not can.unseen and not can.confounded and not can.untried:
         print("never identifiable: none; what a recording does not excite, its diagnosis says")
     for each in can.sums:
         print(f"seen of bodies and rotors: {_write_sum(each)}")

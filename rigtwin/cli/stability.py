@@ -81,8 +81,8 @@ def execute(parsed: argparse.Namespace) -> int:
         POINTS,
         SPARSE,
         around,
-        checked_ending,
-        checked_model,
+        check_image_format,
+        check_model,
         draw,
         stability_map,
     )
@@ -101,8 +101,8 @@ def execute(parsed: argparse.Namespace) -> int:
     for path in filter(None, (out if parsed.map else None, parsed.json)):
         writable(path)
     if parsed.map:
-        checked_ending(out)
-        checked_model(model)
+        check_image_format(out)
+        check_model(model)
         if parsed.delay:
             raise RigtwinError("--delay with --map: a map is of lags; leave one of them out")
         if parsed.map[0] == parsed.map[1]:
@@ -174,9 +174,9 @@ def _printed(found: Stability) -> str:
 def _margin(margin: rigtwin.RigMargin) -> str:
     told = f"slowest motion {-margin.plain:+.2g} 1/s plain, "
     told += f"{-margin.compensated:+.2g} 1/s with the plate's delay compensated"
-    if margin.bears is None:
+    if margin.delay_margin is None:
         return f"{told}, unstable with that too"
-    return f"{told}, stable with {1e3 * margin.bears:.2g} ms more delay than it is told of"
+    return f"{told}, stable with {1e3 * margin.delay_margin:.2g} ms more delay than it is told of"
 
 
 def _time(time: float | None, frequency: float | None) -> tuple[str, str]:

@@ -22,7 +22,7 @@ from rigtwin.description.document import examine_text
 from rigtwin.description.machine import Machine
 from rigtwin.description.mechanism import Mechanism
 from rigtwin.errors import RigtwinError
-from rigtwin.files import keep_apart, write_whole
+from rigtwin.files import atomic_write, forbid_overwriting
 from rigtwin.importing.columns import Columns
 from rigtwin.importing.convert import read_channels, read_columns
 from rigtwin.importing.mapping import Map, parse
@@ -146,12 +146,12 @@ class Described:
         for path in paths:
             if path.exists():
                 raise RigtwinError(f"{path} exists; choose another folder, or remove it first")
-            keep_apart(path, self.machine.model, *self.log)
+            forbid_overwriting(path, self.machine.model, *self.log)
         model = os.path.relpath(self.machine.model, place)
         first = f"model = {_quote(self.machine.model.name)}"
         text = self.description.replace(first, f"model = {_quote(Path(model).as_posix())}", 1)
-        write_whole(paths[0], text)
-        write_whole(paths[1], self.mapping)
+        atomic_write(paths[0], text)
+        atomic_write(paths[1], self.mapping)
         return paths
 
     def __str__(self) -> str:

@@ -19,7 +19,7 @@ from rigtwin.components.servo import PUSHERS
 from rigtwin.description.machine import Component, Machine
 from rigtwin.description.mechanism import Mechanism
 from rigtwin.errors import RigtwinError
-from rigtwin.files import write_whole
+from rigtwin.files import atomic_write
 
 ATTRIBUTES: dict[type, dict[str, str]] = {
     Guide: {"coulomb": "frictionloss", "viscous": "damping", "stiffness": "stiffness"},
@@ -176,7 +176,7 @@ def write_mjcf(path: Path, machine: Machine, changes: Sequence[Change]) -> tuple
     for change in changes:
         if not _apply(document, machine, change, changes):
             left.append(f"{change.component}.{change.parameter} = {change.value:.6g}")
-    write_whole(path, document.text())
+    atomic_write(path, document.text())
     return tuple(left)
 
 

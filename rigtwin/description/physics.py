@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from rigtwin.hardware.daq.signals import Signals
     from rigtwin.hardware.daq.table import ChannelTable
     from rigtwin.hardware.daq.wired import Wired
-    from rigtwin.hardware.session.own_controller import OwnController
+    from rigtwin.hardware.session.custom_controller import CustomController
     from rigtwin.hardware.session.test import AnyTest
     from rigtwin.models.model import Model
     from rigtwin.render.curves import Curve
@@ -259,7 +259,7 @@ class Physics(ABC):
         seed: int,
         table: ChannelTable,
         effects: Sequence[str],
-        own: OwnController | None,
+        controller: CustomController | None,
     ) -> AnyTest:
         """Return the test of a session.
 
@@ -277,8 +277,8 @@ class Physics(ABC):
             Channel table of the card.
         effects
             Effects of the twin on the virtual card.
-        own
-            Custom controller.
+        controller
+            Custom controller; None for the machine's own.
         """
 
     # Pictures

@@ -14,7 +14,7 @@ from rigtwin.description.settings import Nothing
 from rigtwin.diagnosis.finding import Finding
 from rigtwin.diagnosis.fit import Fit
 from rigtwin.errors import RigtwinError
-from rigtwin.files import printable, write_whole
+from rigtwin.files import atomic_write, printable
 
 if TYPE_CHECKING:
     from rigtwin.diagnosis.result import Diagnosis
@@ -100,5 +100,5 @@ def save(path: Path, diagnosis: Diagnosis) -> Path:
     """Writes it. Raises RigtwinError if it cannot, or if the data were not fit for a diagnosis."""
     if diagnosis.evidence is None:
         raise RigtwinError(f"{path} not written: the data cannot be diagnosed")
-    write_whole(path, toml(diagnosis))
+    atomic_write(path, toml(diagnosis))
     return path

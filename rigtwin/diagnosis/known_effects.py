@@ -19,7 +19,7 @@ from rigtwin.diagnosis.fitter import Fitter
 from rigtwin.diagnosis.gauss_newton import take_derivatives
 from rigtwin.diagnosis.overlay import Overlay, overlay
 from rigtwin.errors import RigtwinError
-from rigtwin.files import keep_apart
+from rigtwin.files import forbid_overwriting
 from rigtwin.numerics.arrays import Array
 
 WIDTH = 1.96
@@ -131,7 +131,7 @@ class EffectFit:
             Change(p.name.partition("@")[2].partition(" ")[0], _parameter(p.name), p.value)
             for p in self.parameters
         ]
-        return write_mjcf(keep_apart(path, *self.described.files), self.described, changes)
+        return write_mjcf(forbid_overwriting(path, *self.described.files), self.described, changes)
 
 
 def _parameter(name: str) -> str:

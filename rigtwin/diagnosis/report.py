@@ -23,7 +23,7 @@ from rigtwin.diagnosis.text import against_nominal, largest_left
 from rigtwin.diagnosis.units import say, spell
 from rigtwin.diagnosis.units import write as write_size
 from rigtwin.diagnosis.words import name_part
-from rigtwin.files import write_whole
+from rigtwin.files import atomic_write
 from rigtwin.render.browser import write_pdf, write_png
 
 if TYPE_CHECKING:
@@ -217,5 +217,5 @@ def _code(text: str) -> Markup:
 
 def write(path: Path, diagnosis: Diagnosis) -> Path:
     """Writes the page. Raises RigtwinError if it cannot."""
-    WRITERS.get(path.suffix.lower(), write_whole)(path, html(diagnosis))
+    WRITERS.get(path.suffix.lower(), atomic_write)(path, html(diagnosis))
     return path

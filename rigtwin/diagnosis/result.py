@@ -17,7 +17,7 @@ from rigtwin.diagnosis.finding import Answer, Finding, Gap, Place, Verdict
 from rigtwin.diagnosis.fit import Fit
 from rigtwin.diagnosis.overlay import Overlay, overlay
 from rigtwin.diagnosis.pictures import Picture, picture
-from rigtwin.files import keep_apart
+from rigtwin.files import forbid_overwriting
 
 
 @dataclass(frozen=True)
@@ -123,12 +123,12 @@ class Diagnosis:
         RigtwinError
             If it cannot be written, or no browser is there to print it.
         """
-        return report.write(keep_apart(path, *self._inputs), self)
+        return report.write(forbid_overwriting(path, *self._inputs), self)
 
     def save_twin(self, path: str | Path) -> Path:
         """Writes the corrected twin as TOML, for `--config`. Raises RigtwinError if it cannot be
         written, or if the data were not fit for a diagnosis."""
-        return calibrated.save(keep_apart(path, *self._inputs), self)
+        return calibrated.save(forbid_overwriting(path, *self._inputs), self)
 
     def save_mjcf(self, path: str | Path) -> tuple[str, ...]:
         """Writes the machine's own MJCF with the corrected values and nothing else changed.
@@ -153,7 +153,7 @@ class Diagnosis:
             for effect in self.effects
             for name, each in effect.parameters.items()
         ]
-        return write_mjcf(keep_apart(path, *self._inputs), self.described, changes)
+        return write_mjcf(forbid_overwriting(path, *self._inputs), self.described, changes)
 
     def __str__(self) -> str:
         return text.describe(self.answer)

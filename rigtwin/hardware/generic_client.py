@@ -1,12 +1,12 @@
-"""A structure in another program that speaks as OpenSees' element `genericClient` does, as
-OpenFresco's users connect it.
+"""Server for a structure simulated in another program, by the protocol of OpenSees' element
+`genericClient`, which OpenFresco's users know.
 
-The client connects by TCP and says, as 11 integers of 32 bits, how many displacements, velocities,
-accelerations, forces and times it will send, how many of each it wants back, and how many numbers a
-message has. Then come messages of that many doubles, in the computer's own byte order. The first is
-what is asked: 3 a trial response (displacements from the second number on), 10 the force, which is
-answered, and 99 the end; 12 to 15 ask for a stiffness, damping or mass, of which the rig has none
-to tell (OpenSees, SRC/element/genericClient; OpenFresco, simApplicationClient).
+A client connects by TCP. Its first message has 11 integers of 32 bits: the numbers of
+displacements, velocities, accelerations, forces and times it sends, the same numbers it wants back,
+and the length of a message. Messages of that many doubles follow, in the computer's byte order. The
+first number is the request: 3 a trial response (displacements from the second number on), 10 the
+force, which is answered, 99 the end. Requests 12 to 15 ask for a stiffness, damping or mass, which
+the rig does not have (OpenSees, SRC/element/genericClient; OpenFresco, simApplicationClient).
 """
 
 from __future__ import annotations
@@ -22,35 +22,35 @@ from rigtwin.simulation.slow_model import SlowModel
 
 TRIAL, COMMIT, FORCE, END = 3, 5, 10, 99
 MATRICES = (12, 13, 14, 15)
-"""What a client asks of an element besides its force: stiffnesses, damping, mass."""
+"""Requests for stiffnesses, damping or mass."""
 SIZES, DISPLACEMENTS, LENGTH = 11, 0, 10
 MOST = 65_536
-"""Numbers in a message."""
+"""Maximum number of doubles in a message."""
 
 
 class GenericClientServer:
-    """Listens for one client, and moves a `SlowModel` as it asks.
+    """Server that listens for one client, and moves a `SlowModel` as the client asks.
 
     Parameters
     ----------
     model
-        Whose targets the client gives.
+        Model whose targets the client sets.
     start
-        m, of the plate: a client's displacements are from there.
+        Position of the plate, in m, that a client's displacements are relative to.
     host, port
-        Where to listen; 0 for any port that is free.
+        Address and port to listen on; port 0 selects a free one.
 
     Raises
     ------
     RigtwinError
-        If nothing can listen there.
+        If the address or port cannot be listened on.
     """
 
     def __init__(
         self, model: SlowModel, start: float, host: str = "127.0.0.1", port: int = 8090
     ) -> None:
         self.fault = ""
-        """What the client did that ended the connection, if it was not its end."""
+        """Error of the client that ended the connection; empty after a regular end."""
         self._model, self._start = model, start
         self._begun = threading.Event()
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
@@ -66,28 +66,32 @@ class GenericClientServer:
         self._thread.start()
 
     def wait(self, seconds: float) -> None:
-        """Until a client has given its first target. Raises RigtwinError if none does."""
+        """Wait until a client has set its first target. Raise RigtwinError after a timeout in s."""
         if not self._begun.wait(seconds):
-            why = self.fault or "none has connected, or it has not moved"
+            why = self.fault or "no client has connected, or it has not moved"
             raise RigtwinError(f"no client at port {self.port} within {seconds:g} s: {why}")
 
     def close(self) -> None:
-        """Ends the model and the connection."""
+        """End the model and the connection."""
         self._model.end()
+        # Shutting down wakes the thread from accept(); closing alone would not on Linux.
         with suppress(OSError):
             self._socket.shutdown(socket.SHUT_RDWR)
         self._socket.close()
         self._thread.join(timeout=1.0)
 
     def _serve(self) -> None:
+        """Accept one client, and answer it until its end."""
         with suppress(OSError):
             connection, _ = self._socket.accept()
             with closing(connection):
+                # A request is one small message that waits for its answer: Nagle's algorithm would
+                # delay each by up to 40 ms.
                 connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
                 try:
                     self._answer(connection)
                 except (OSError, RigtwinError) as error:
-                    # The rig's own loop finds that no target comes, and ends the test.
+                    # The rig's loop notices that no target comes, and ends the test.
                     self.fault = str(error)
 
     def _answer(self, connection: socket.socket) -> None:
@@ -103,14 +107,16 @@ class GenericClientServer:
             if asked == TRIAL:
                 if not np.isfinite(message[1]):
                     raise RigtwinError("a client gave a displacement that is not a number")
+                # The model is closed once the rig's loop has ended.
                 if not self._model.give(self._start + float(message[1])):
                     return
+                # The rig may start only after a target exists.
                 self._begun.set()
             elif asked == FORCE:
                 force = self._model.take_force()
                 if force is None:
                     return
-                # The client's equations have it on the side of what resists.
+                # The client's equations have the restoring force on the side of the resistance.
                 reply[0] = -force
                 connection.sendall(reply.tobytes())
             elif asked in MATRICES:
@@ -123,7 +129,7 @@ class GenericClientServer:
 
 
 def _receive(connection: socket.socket, count: int) -> bytes:
-    """So many bytes. Raises RigtwinError if the client goes before."""
+    """Receive a number of bytes. Raise RigtwinError if the client disconnects before."""
     parts: list[bytes] = []
     while count > 0:
         part = connection.recv(min(count, 1 << 16))

@@ -1,4 +1,4 @@
-"""What a session has to know of a machine that it leads into a test and out of it."""
+"""Interface between a session and the machine that it ramps into a test and out of it."""
 
 from __future__ import annotations
 
@@ -8,18 +8,31 @@ from typing import Any, Protocol
 from rigtwin.hardware.daq.signals import Signals
 from rigtwin.hardware.supervisor import Cause
 
+# A session is independent of the machine, so these types are opaque to it.
 Sample = Any
-"""What was read: of the rig `controllers.Measurements`, of another machine its inputs' values."""
+"""Sample: `controllers.Measurements` of the rig, or a tuple of another machine's inputs."""
 Commands = Any
-"""What is commanded: of the rig `controllers.Commands`, of another machine its outputs' values and
-what else is demanded."""
+"""Commands: `controllers.Commands` of the rig, or a tuple of another machine's outputs and further
+demands."""
 
 
 @dataclass(frozen=True)
 class Course:
-    """Times of a session, s. looking: at the sensors, before power; armed: under power before
-    anything is moved; ramp: to the start of the test, and back; settling: there; hold: after a
-    stop, before power is taken off."""
+    """Times of a session's phases, in s.
+
+    Attributes
+    ----------
+    looking
+        Check of the sensors before power.
+    armed
+        Power before anything moves.
+    ramp
+        Motion to the start of the test, and back.
+    settling
+        Rest at the start.
+    hold
+        Power after a stop.
+    """
 
     looking: float
     armed: float
@@ -29,11 +42,26 @@ class Course:
 
 
 class Operation(Protocol):
-    """A test of one machine, and how that machine is kept safe.
+    """Test of one machine, with the rules that keep the machine safe.
 
-    signals: what it has; period: s; ticks: of the test; course: of its session; missed: ticks that
-    may be missed in a row; rest: commands at which nothing moves, once `look` was called; target:
-    commands at the start of the test; watched: names of what `watch` gives.
+    Attributes
+    ----------
+    signals
+        Signals of the machine.
+    period
+        Period of a tick, in s.
+    ticks
+        Number of ticks of the test.
+    course
+        Times of the session's phases.
+    missed
+        Maximum number of ticks missed in a row.
+    rest
+        Commands at which nothing moves; valid once `look` was called.
+    target
+        Commands at the start of the test.
+    watched
+        Names of the values that `watch` returns.
     """
 
     signals: Signals
@@ -46,34 +74,36 @@ class Operation(Protocol):
     watched: tuple[str, ...]
 
     def look(self, measured: Sample) -> str | None:
-        """Why it may not be armed as it stands, or None. Sets `rest`; what a tick needs is warmed
-        up."""
+        """Return why the machine must not be armed as it stands, or None.
+
+        The call sets `rest`, and warms up everything that a tick needs.
+        """
         ...
 
     def control(self, tick: int, measured: Sample) -> Commands:
-        """The controller's commands at a tick of the test."""
+        """Return the controller's commands at a tick of the test."""
         ...
 
     def judge_measured(self, measured: Sample, interval: float) -> Cause | None:
-        """What is wrong with what was read, s after the tick before."""
+        """Return what is wrong with a sample, or None; `interval` since the last one is in s."""
         ...
 
     def judge_commands(self, measured: Sample, commands: Commands, interval: float) -> Cause | None:
-        """What is wrong with commands that are to be written."""
+        """Return what is wrong with commands before they are written, or None."""
         ...
 
     def stop_state(self, held: Commands) -> Commands:
-        """Commands that are safe after those that were held."""
+        """Return the safe commands that follow held ones."""
         ...
 
     def holds_after(self, cause: Cause) -> bool:
-        """Whether it may be kept under power for a while after a stop for that cause."""
+        """Return whether the machine may stay under power for a while after a stop for a cause."""
         ...
 
     def may_be_held(self, measured: Sample) -> bool:
-        """Whether it still may, as it stands."""
+        """Return whether the machine may still stay under power, given a sample."""
         ...
 
     def watch(self, measured: Sample, commands: Commands) -> tuple[float, ...]:
-        """Whose greatest magnitudes are told of a session."""
+        """Return the signals whose largest magnitudes a session reports."""
         ...

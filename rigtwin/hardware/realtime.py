@@ -1,8 +1,4 @@
-"""Real time.
-
-Deadlines that do not drift, what the system grants a loop that must meet them, and how late it
-was.
-"""
+"""Real time: deadlines without drift, privileges granted by the system, and lateness statistics."""
 
 from __future__ import annotations
 
@@ -28,18 +24,19 @@ from rigtwin.system import (
 from rigtwin.system.grant import SCHEDULING, Grant
 
 SPIN = 200e-6
-"""s before a deadline from which the loop spins: the kernel's sleep ends later than asked for by
-tens of microseconds."""
+"""Time before a deadline from which the loop spins, in s. The kernel ends a sleep tens of
+microseconds late."""
 PRIORITY = 80
+"""FIFO priority of the loop: above the kernel's interrupt threads, which have 50 by default."""
 EDGES = tuple(
     1e-6 * value
     for value in (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10_000, 100_000)
 )
-"""Upper edges of the lateness histogram, s; the last class is what is beyond."""
+"""Upper edges of the classes of the lateness histogram, in s. The last class has no upper edge."""
 
 
 def sleep_until(deadline: float, spin: float = SPIN) -> None:
-    """Returns at a time of `monotonic`, spinning over the last `spin` seconds."""
+    """Return at a time of `monotonic`, after spinning over the last `spin` seconds."""
     remaining = deadline - monotonic() - spin
     if remaining > 0.0:
         time.sleep(remaining)
@@ -48,20 +45,26 @@ def sleep_until(deadline: float, spin: float = SPIN) -> None:
 
 
 class Pacer:
-    """Ticks at absolute deadlines, so that a late one does not shift those after it.
+    """Ticks at absolute deadlines, so that a late tick does not delay the ones after it.
 
-    late: s by which the last wait ended after its deadline. A tick that ends after the next
-    deadline is missed, and the loop goes on with the first one that is still ahead.
+    A tick that ends after the next deadline is missed. The loop then continues with the first
+    deadline that lies ahead.
+
+    Attributes
+    ----------
+    late
+        Time by which the last wait ended after its deadline, in s.
     """
 
     def __init__(self, period: float) -> None:
         self.period, self.late, self._next = period, 0.0, 0.0
 
     def wait(self) -> int:
-        """Waits for the next deadline that is not past; returns how many were missed."""
+        """Wait for the next deadline that lies ahead; return the number of missed deadlines."""
         now = monotonic()
         if self._next == 0.0:
             self._next = now
+        # Deadlines that have passed are skipped, so that ticks stay on the original grid.
         behind = int((now - self._next) / self.period) if now > self._next else 0
         self._next += behind * self.period
         if behind == 0:
@@ -72,21 +75,22 @@ class Pacer:
 
 
 class Lateness:
-    """How late each tick was, and how long its work took, both in s."""
+    """Lateness of each tick, and duration of its work, in s."""
 
     def __init__(self, ticks: int) -> None:
         self._late, self._work, self._count, self.missed = np.zeros(ticks), np.zeros(ticks), 0, 0
 
     def add(self, late: float, work: float) -> None:
+        """Add a tick. Arrays are allocated beforehand, so that no tick waits for memory."""
         if self._count < len(self._late):
             self._late[self._count], self._work[self._count] = late, work
             self._count += 1
 
     def record(self, scheduling: str) -> dict[str, str]:
-        """What a recording keeps.
+        """Return the statistics as a recording stores them.
 
-        The histogram (upper edges in s, ticks in each class), median, 99.9th percentile and
-        maximum of both, ticks missed, and what the system granted.
+        They are the histogram (upper edges in s, ticks per class), median, 99.9th percentile and
+        maximum of lateness and work, the number of missed ticks, and the system's grants.
         """
         figures = {"missed": str(self.missed), "scheduling": scheduling, "ticks": str(self._count)}
         for name, values in (
@@ -97,6 +101,7 @@ class Lateness:
                 figures |= {
                     f"{name}_{key}": f"{value:.3e}" for key, value in _statistics(values).items()
                 }
+        # A histogram keeps rare delays that a mean or a percentile would hide.
         counts, _ = np.histogram(self._late[: self._count], bins=[-np.inf, *EDGES, np.inf])
         figures["histogram"] = json.dumps({"edges": EDGES, "counts": counts.tolist()})
         return figures
@@ -112,26 +117,28 @@ def _statistics(values: Array) -> dict[str, float]:
 
 @contextmanager
 def in_real_time(fifo: bool = True) -> Iterator[tuple[Grant, ...]]:
-    """Takes what the system permits for the time of the loop, and gives it back.
+    """Run a loop with the privileges that the system grants, and return them afterwards.
 
-    FIFO scheduling, memory locked, no garbage collection.
-
+    The privileges are FIFO scheduling, locked memory, and no garbage collection.
     Parameters
     ----------
     fifo : bool
-        Whether to ask for the scheduling class at all.
+        Whether to request FIFO scheduling.
 
     Yields
     ------
     tuple of Grant
-        What was granted and what not.
+        Result of each request.
     """
     grants = [lock_memory(), Grant("no garbage collection")]
     collecting, interval = gc.isenabled(), sys.getswitchinterval()
+    # Frozen objects are never scanned again, so that a collection after the loop is short.
     gc.collect()
     gc.disable()
     gc.freeze()
+    # Other Python threads must give the interpreter back within 0.1 ms instead of 5 ms.
     sys.setswitchinterval(1e-4)
+    # Priority is the last request: everything before it may take its time.
     before = raise_priority(PRIORITY) if fifo else Grant(SCHEDULING, "not asked for")
     grants.append(before)
     try:
@@ -148,7 +155,7 @@ def in_real_time(fifo: bool = True) -> Iterator[tuple[Grant, ...]]:
 
 
 def list_shortcomings() -> list[str]:
-    """What this computer lacks for a loop in real time, a line each; changes nothing."""
+    """Return what this computer lacks for a loop in real time, one per line. Nothing is changed."""
     lacks: list[str] = []
     with in_real_time() as grants:
         lacks += [f"{grant.name}: {grant.lacking}" for grant in grants if grant.lacking]
@@ -162,4 +169,5 @@ def list_shortcomings() -> list[str]:
 
 
 def describe_grants(grants: tuple[Grant, ...]) -> str:
+    """Return the grants in one line."""
     return "; ".join(f"{grant.name}: {grant.lacking or 'granted'}" for grant in grants)

@@ -1,4 +1,4 @@
-"""The suspension rig in a session: its controller, its limits and its stop state."""
+"""Operation of the suspension rig: its controller, its limits and its stop state."""
 
 from __future__ import annotations
 
@@ -33,14 +33,14 @@ from rigtwin.simulation.safety import (
 )
 
 LOOKING = 0.3
-"""s for which the sensors are looked at before the rig is armed; it also warms up everything that
-a tick needs."""
+"""Time during which sensors are checked before the rig is armed, in s. Meanwhile everything that a
+tick needs is warmed up."""
 ARMED = 0.1
-"""s of pressure before anything is moved."""
+"""Time under pressure before anything moves, in s."""
 SETTLING = 0.3
-"""s at the start position between the ramp and the test."""
+"""Time at the start position between ramp and test, in s."""
 NOT_HELD = ("following", "structure", "ground", "travel", "velocity", "wheel")
-"""Causes after which cylinders are not held under pressure: one of them may be what is wrong."""
+"""Causes after which cylinders are not held under pressure, because a cylinder may be at fault."""
 NOTHING = Commands(0.0, 0.0, 0.0, 0.0)
 Update = Callable[[Controller, State, Measurements, Demand], tuple[State, Commands]]
 
@@ -54,9 +54,17 @@ class RigOperation:
     def __init__(
         self, configuration: Configuration, demands: Array, updating: Update = update
     ) -> None:
-        """Configuration: with the limits that the card adds; demands: columns of
-        controllers.Demand, shape (ticks, 3); updating: the controller. It is asked once before
-        anything moves, and that answer is thrown away."""
+        """Prepare a test of the rig.
+
+        Parameters
+        ----------
+        configuration
+            Settings of the test, with the limits that the card adds.
+        demands
+            Demands, shape (ticks, 3), in the order of `controllers.Demand`.
+        updating
+            Controller. It is called once before anything moves, and that result is discarded.
+        """
         self._limits, self._demands, self._updating = configuration.safety, demands, updating
         self.period, self.ticks = configuration.timing.period, len(demands)
         self.course = Course(LOOKING, ARMED, self._limits.ramp, SETTLING, self._limits.hold)
@@ -66,10 +74,12 @@ class RigOperation:
         self.rest, self.target = NOTHING, _start_of(configuration, demands)
 
     def look(self, measured: Measurements) -> str | None:
+        """Return why the rig must not be armed, or None; take its position as the rest."""
         refused = find_arming_obstacle(self._limits, measured)
         if refused is None:
             self.rest = Commands(measured.ground_lvdt, measured.structure_lvdt, 0.0, 0.0)
             first = Demand(*self._demands[0].tolist())
+            # The first call of a controller is slow; here nothing waits for it.
             self._updating(self._controller, self._state, measured, first)
         return refused
 
@@ -88,8 +98,8 @@ class RigOperation:
             judge_commands(self._limits, interval, self._memory, measured, commands)
         )
 
-    def _explain(self, found: tuple[int, int]) -> Cause | None:
-        number, column = found
+    def _explain(self, judgement: tuple[int, int]) -> Cause | None:
+        number, column = judgement
         if number == Trip.NONE:
             return None
         trip = Trip(number)
@@ -109,8 +119,10 @@ class RigOperation:
 
 
 def _start_of(configuration: Configuration, demands: Array) -> Commands:
+    """Return the commands at the start of a test: the controller's, unless motion is imposed."""
     settings = configuration.controller
     ground, structure, force = demands[0].tolist()
+    # In a model-in-the-loop test only the ground is imposed; the rest starts from the settings.
     if settings.mode != Mode.IMPOSED:
         structure, force = settings.start, settings.preload
     return Commands(ground, structure, force, force / MOTOR_CONSTANT)

@@ -1,10 +1,8 @@
-"""A test on a rig that is ramped in and out under supervision.
+"""Supervised test: ramped in and out, on the real rig, its virtual card or the twin.
 
-The same for the real rig, its virtual card and the twin.
-
-Between controller and rig stand its limits, which are part of its `Operation`, and the states of
-`rigtwin.hardware.supervisor`. Whatever goes wrong, the outputs go to the stop state at that tick:
-no force, positions held, and after a while power is taken off.
+The limits of the `Operation` and the states of `rigtwin.hardware.supervisor` stand between
+controller and rig. At any fault the outputs go to the stop state in the same tick: zero force,
+positions held. The power is switched off after a while.
 """
 
 from __future__ import annotations
@@ -23,59 +21,59 @@ from rigtwin.simulation.rig import DrivenRig
 from rigtwin.system import monotonic
 
 OFTEN, MOST_MISSED = 0.005, 0.2
-"""Share by which a tick enters the average of ticks missed, and what that may be: one in five,
-over some 200."""
+"""Weight of a tick in the moving average of missed ticks, about 200 ticks long, and the average's
+upper limit, one in five."""
 
 
 class Recorder(Protocol):
-    """Keeps what a session does.
+    """Interface of a recorder of a session.
 
-    `fault`: why it cannot any more, or None; looked at in every tick.
+    `fault` is why it cannot record any more, or None; it is checked in every tick.
     """
 
     @property
     def fault(self) -> str | None: ...
 
     def tick(self, row: tuple[float, ...]) -> None:
-        """One tick of the session.
+        """Record one tick.
 
-        The fields of /session, those of /command, then the tick's number in the test, not a number
-        outside it.
+        A row has the fields of /session, those of /command, and the tick's number in the test,
+        which is NaN outside the test.
         """
         ...
 
     def transition(self, transition: Transition) -> None: ...
 
     def ready(self) -> None:
-        """Called when the rig's lines are there and nothing moves yet.
+        """Prepare for motion: the rig's lines are open, and nothing moves yet.
 
         Raises RigtwinError if the session must not begin.
         """
         ...
 
     def beat(self, outputs: Sequence[float]) -> None:
-        """Called once a tick: the loop is alive, and these outputs would be safe."""
+        """Note once a tick that the loop is alive, and which outputs would be safe."""
         ...
 
     def flush(self) -> None:
-        """Called when nothing moves any more: what is not written yet is to be."""
+        """Write what is not written yet, once nothing moves any more."""
         ...
 
 
 @dataclass(frozen=True)
 class SessionEnd:
-    """How a session ended.
+    """End of a session.
 
     Parameters
     ----------
     cause : Cause
-        Why.
+        Cause of the end.
     ticks : int
-        Of the test that were recorded.
+        Number of recorded ticks of the test.
     transitions : tuple of Transition
-        All of them, in order.
+        All transitions in order.
     peaks : dict
-        Greatest magnitude of each signal that the operation watches.
+        Largest magnitude of each signal that the operation watches.
     """
 
     cause: Cause
@@ -92,37 +90,39 @@ def supervise(
     lateness: Lateness | None = None,
     progress: Callable[[int], object] = lambda _: None,
 ) -> SessionEnd:
-    """Runs a test, ramped in and out.
+    """Run a test, ramped in and out.
 
     Parameters
     ----------
     rig : DrivenRig
-        What is moved.
+        Rig that is moved.
     operation : Operation
-        The test, and how the machine is kept safe.
+        Test, and the rules that keep the machine safe.
     recorder : Recorder
-        Keeps what happens.
+        Recorder of the session.
     stop : callable
-        Looked at in every tick; a text stops the session and is its reason.
+        Function called in every tick; a text it returns stops the session and is the reason.
     lateness : Lateness, optional
-        Is filled, if the rig runs in real time.
+        Statistics to be filled, if the rig runs in real time.
     progress : callable
-        Called with the ticks done since its last call.
+        Function called with the number of ticks since its last call.
 
     Returns
     -------
     SessionEnd
-        How it ended.
+        End of the session.
 
     Raises
     ------
     RigtwinError
-        Only before anything has moved.
+        If the session cannot begin; nothing has moved then.
     """
     return _Session(rig, operation, recorder, stop, lateness, progress).run()
 
 
 class _Session:
+    """State of a supervised test. See `supervise` for the arguments."""
+
     def __init__(
         self,
         rig: DrivenRig,
@@ -139,16 +139,18 @@ class _Session:
         self._supervisor = Supervisor(recorder.transition)
         course = self._course
         before = (course.looking, course.armed, course.ramp, course.settling)
+        # Time zero is the start of the test, so that ticks before it have negative times.
         self._clock = -round(sum(before) / self._period)
+        # The last commands, which the stop state holds, and whether there is power.
         self._held, self._power = operation.rest, False
         self._unread = self._signals.sample(*[math.nan] * len(self._signals.inputs))
-        self._told = self._done_before = 0
+        self._ticks_noted = self._done_before = 0
         self._behind = 0.0
         self._done, self._peaks = 0, [0.0] * len(operation.watched)
 
     @property
     def _interval(self) -> float:
-        """s since the tick before, of which some may have been missed."""
+        """Time since the last tick, in s, including missed ticks."""
         return (1 + self._rig.missed) * self._period
 
     @property
@@ -156,13 +158,14 @@ class _Session:
         return self._clock * self._period
 
     def run(self) -> SessionEnd:
-        """The way through all states; every step of it ends in `_come_to_rest`."""
+        """Go through all states. Every path after arming ends in `_come_to_rest`."""
         rig, recorder = self._rig, self._recorder
         try:
             try:
                 rig.start()
                 recorder.ready()
                 rest = self._look()
+            # BaseException, here and below: Ctrl-C and SystemExit must not leave the rig moving.
             except BaseException as error:
                 rig.stop()
                 self._supervisor.go(Phase.FAULTED, _cause_of(error), self._time)
@@ -173,6 +176,7 @@ class _Session:
                 cause = self._halt(_cause_of(error))
             self._come_to_rest(cause, rest)
         finally:
+            # Also reached if coming to rest itself failed: the card's own stop is the last means.
             rig.stop()
             if self._supervisor.phase == Phase.STOPPING:
                 self._supervisor.go(
@@ -189,20 +193,30 @@ class _Session:
         )
 
     def _look(self) -> Commands:
-        """Idle: whether every sensor lives and lies within its limit.
+        """Check in the idle state that every sensor works and is within its limit.
 
-        Returns the commands at which nothing moves. Raises RigtwinError if the rig must not be
-        armed.
+        Returns
+        -------
+        Commands
+            Commands at which nothing moves.
+
+        Raises
+        ------
+        RigtwinError
+            If the rig must not be armed.
         """
         measured = self._rig.read()
         refused = self._operation.look(measured)
         if refused is not None:
             raise RigtwinError(f"not armed: {refused}")
+        # Commands equal to the present position: arming must not move anything.
         rest = self._held = self._operation.rest
         for _ in range(max(round(self._course.looking / self._period), 1)):
             self._rig.write(rest)
+            # Writing without power moves nothing, and shows that the card accepts outputs.
             cause = self._find_fault(measured)
             cause = self._operation.judge_commands(measured, rest, self._interval) or cause
+            # Late ticks are expected here: everything runs for the first time.
             if cause is not None and cause.name != "late":
                 raise RigtwinError(f"not armed: {cause.reason}")
             self._row(measured, rest)
@@ -210,7 +224,7 @@ class _Session:
         return rest
 
     def _move(self, rest: Commands) -> Cause:
-        """Armed, ramping, running. Returns why it ended."""
+        """Go through armed, ramping and running. Return the cause of the end."""
         self._supervisor.go(
             Phase.ARMED,
             Cause("operator", "every sensor lives and is within its limit", fault=False),
@@ -229,6 +243,7 @@ class _Session:
             cause = self._tick(lambda _, between=between: between)
             if cause is not None:
                 return cause
+        # Settling ends when the clock reaches the start, whatever ticks were missed in the ramp.
         while self._clock < 0:
             cause = self._tick(lambda _: self._operation.target)
             if cause is not None:
@@ -247,7 +262,10 @@ class _Session:
         return self._operation.control(self._clock, measured)
 
     def _ramp(self, begin: Commands, end: Commands) -> Iterator[Commands]:
-        """From one to the other, without a jump in velocity; nothing where no time is for it."""
+        """Yield commands from one point to another without a jump in velocity.
+
+        Nothing is yielded if the course has no ramp.
+        """
         if self._course.ramp == 0.0:
             return
         for share in _cosine_shares(self._course.ramp, self._period):
@@ -256,16 +274,21 @@ class _Session:
             )
 
     def _tick(self, command: Callable[[Sample], Commands]) -> Cause | None:
-        """One tick: read, look, command, look, write.
+        """Do one tick: read, judge the sample, command, judge the commands, write.
 
-        Returns why the session must stop, after the outputs are at the stop state, or None.
+        Returns
+        -------
+        Cause or None
+            Cause to stop, after the outputs are at the stop state; None to continue.
         """
         running = self._supervisor.phase == Phase.RUNNING
         try:
             measured = self._rig.read()
         except Exception as error:
             return self._halt(_cause_of(error))
+        # The work is timed from the sample on; waiting for it is no work.
         begun = monotonic()
+        # A missed tick counts as passed: the demands belong to times, not to readings.
         self._clock += self._rig.missed
         if self._lateness is not None:
             self._lateness.missed += self._rig.missed
@@ -277,6 +300,7 @@ class _Session:
             try:
                 commands = command(measured)
                 cause = self._operation.judge_commands(measured, commands, self._interval)
+            # A controller is a user's code: whatever it raises must stop the rig, not the program.
             except Exception as error:
                 commands = self._held
                 cause = Cause(
@@ -296,12 +320,14 @@ class _Session:
         return None
 
     def _find_fault(self, measured: Sample) -> Cause | None:
-        """What is wrong besides the commands."""
+        """Return what is wrong besides the commands, or None."""
         self._beat()
-        found = self._operation.judge_measured(measured, self._interval)
+        judgement = self._operation.judge_measured(measured, self._interval)
         missed, most = self._rig.missed, self._operation.missed
+        # Lateness is reported first: after missed ticks a sensor's jump is only a consequence.
         if missed > most:
             return Cause("late", f"{missed} ticks missed in a row; at most {most:g} may be")
+        # Moving average of the share of missed ticks among those that were due.
         self._behind += OFTEN * (missed / (1.0 + missed) - self._behind)
         if self._behind > MOST_MISSED:
             return Cause(
@@ -309,8 +335,8 @@ class _Session:
                 f"of the last ticks {100 * self._behind:.0f} % were missed; "
                 "the loop cannot keep the pace",
             )
-        if found is not None:
-            return found
+        if judgement is not None:
+            return judgement
         fault = self._recorder.fault
         if fault is not None:
             return Cause("recording", fault)
@@ -324,13 +350,14 @@ class _Session:
         commands: Commands | None = None,
         tick: float = math.nan,
     ) -> Cause:
-        """Outputs to the stop state, now: no force, positions where they were last told to be.
+        """Set the outputs to the stop state at once, then record the tick.
 
-        Then it is noted.
+        The stop state has zero force, and positions as last commanded.
         """
         self._held = self._operation.stop_state(self._held)
         try:
             self._rig.write(self._held)
+        # A card that accepts no output is stopped by its own means, which remove the power.
         except Exception:
             self._power = False
             self._rig.stop()
@@ -338,11 +365,12 @@ class _Session:
         return cause
 
     def _come_to_rest(self, cause: Cause, rest: Commands) -> None:
-        """Back to where it stood, if all is well; else hold. Then take the power off."""
+        """Return to the initial position after a completed test, else hold; then remove power."""
         self._supervisor.go(Phase.STOPPING, cause, self._time)
         if cause == COMPLETED:
             later = self._ramp_out(rest)
             cause = later or cause
+        # Positions are held under power for a while, unless a cylinder may be at fault.
         holds = self._operation.holds_after(cause)
         for _ in range(round(self._course.hold / self._period) if holds else 0):
             if not self._power or not self._hold():
@@ -352,10 +380,11 @@ class _Session:
         except Exception:
             self._rig.stop()
         self._power = False
-        # Nothing is left that could move: giving the card back may take its time.
+        # Nothing can move any more, so releasing the card may take its time.
         self._supervisor.go(Phase.FAULTED if cause.fault else Phase.STOPPED, cause, self._time)
 
     def _ramp_out(self, rest: Commands) -> Cause | None:
+        """Ramp back to the initial position. Return the cause if the ramp had to be stopped."""
         begin = self._held
         for between in self._ramp(begin, rest):
             cause = self._tick(lambda _, between=between: between)
@@ -365,10 +394,7 @@ class _Session:
         return None
 
     def _hold(self) -> bool:
-        """A tick of holding.
-
-        False if there is no use in it: the card is gone, or it must not be held.
-        """
+        """Hold for one tick. Return False if the card is gone or the rig must not be held."""
         try:
             measured = self._rig.read()
             self._rig.write(self._held)
@@ -380,14 +406,13 @@ class _Session:
         return self._operation.may_be_held(measured)
 
     def _beat(self) -> None:
+        """Tell the recorder that the loop is alive, and which outputs are safe now."""
+        # The guardian would write these values if the loop died in this tick.
         safe = self._operation.stop_state(self._held)
         self._recorder.beat(self._signals.to_write(safe))
 
     def _row(self, measured: Sample, commands: Commands, tick: float = math.nan) -> None:
-        """Notes a tick, which is over with that.
-
-        tick: its number in the test, if it is of the test.
-        """
+        """Record a tick, which ends with that. `tick` is its number in the test, or NaN."""
         held, rig = self._held, self._rig
         written = (*self._signals.to_write(held), float(self._power))
         late, phase = getattr(rig, "late", 0.0), float(self._supervisor.phase)
@@ -399,24 +424,29 @@ class _Session:
                 self._peaks[place] = abs(value)
         self._done += not math.isnan(tick)
         self._clock += 1
-        self._told += 1
-        if self._told % BLOCK == 0:
+        self._ticks_noted += 1
+        # Progress is reported once a block, because a call per tick would cost time.
+        if self._ticks_noted % BLOCK == 0:
             self._progress(self._done - self._done_before)
             self._done_before = self._done
 
 
 def _cosine_shares(duration: float, period: float) -> Iterator[float]:
-    """From 0 to 1 without a jump in velocity."""
+    """Yield shares from 0 to 1, by a cosine without a jump in velocity."""
+    # A raised cosine starts and ends at rest.
     ticks = max(1, round(duration / period))
     for tick in range(1, ticks + 1):
         yield 0.5 - 0.5 * math.cos(math.pi * tick / ticks)
 
 
 def _line(error: BaseException) -> str:
+    """Return the text of an error in one line."""
     return " ".join(str(error).split()) or "no message"
 
 
 def _cause_of(error: BaseException) -> Cause:
+    """Return the cause that an error stands for."""
+
     if isinstance(error, KeyboardInterrupt):
         return Cause("operator", "stopped by the operator: interrupted", fault=False)
     if isinstance(error, RigtwinError):

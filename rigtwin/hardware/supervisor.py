@@ -1,9 +1,8 @@
-"""The states of a session on a rig, and the only ways between them.
+"""States of a session on a rig, and the permitted transitions.
 
 idle → armed → ramping → running → stopping → stopped | faulted
 
-From armed on, `stopping` can be reached from every state, and nothing but `stopping` leads out of
-motion.
+From `armed` on, `stopping` can be reached from every state. Motion ends only through `stopping`.
 """
 
 from __future__ import annotations
@@ -16,9 +15,9 @@ from rigtwin.errors import RigtwinError
 
 
 class Phase(IntEnum):
-    """What the rig may do.
+    """State of a session.
 
-    IDLE, STOPPED, FAULTED: motor without force, no pressure. ARMED: pressure, nothing moves.
+    IDLE, STOPPED and FAULTED: motor without force, no pressure. ARMED: pressure, but no motion.
     """
 
     IDLE = 0
@@ -30,6 +29,7 @@ class Phase(IntEnum):
     FAULTED = 6
 
 
+# Every pair not listed is forbidden: a state machine that is wrong must fail, not move the rig.
 NEXT = {
     Phase.IDLE: (Phase.ARMED, Phase.FAULTED),
     Phase.ARMED: (Phase.RAMPING, Phase.STOPPING),
@@ -43,10 +43,16 @@ NEXT = {
 
 @dataclass(frozen=True)
 class Cause:
-    """Why a session leaves a state.
+    """Cause of a transition.
 
-    name: one word, for programs; reason: one line, for the operator; fault: whether it must not go
-    on as if nothing had been.
+    Attributes
+    ----------
+    name
+        One word, for programs.
+    reason
+        One line, for the operator.
+    fault
+        Whether the operator must act before the next session.
     """
 
     name: str
@@ -59,7 +65,7 @@ COMPLETED = Cause("completed", "completed", fault=False)
 
 @dataclass(frozen=True)
 class Transition:
-    """One step between states. time: s since the start of the test, negative before it."""
+    """Transition between two states. `time` is in s since the start of the test."""
 
     time: float
     before: Phase
@@ -67,7 +73,7 @@ class Transition:
     cause: Cause
 
     def record(self) -> dict[str, str]:
-        """What a recording keeps of it."""
+        """Return the transition as a recording stores it."""
         return {
             "time": f"{self.time:.6f}",
             "from": self.before.name.lower(),
@@ -78,13 +84,14 @@ class Transition:
 
 
 class Supervisor:
-    """Where a session stands. told: called with every transition when it is made."""
+    """State of a session. `on_transition` is called with every transition."""
 
-    def __init__(self, told: Callable[[Transition], object] = lambda _: None) -> None:
-        self.phase, self.transitions, self._told = Phase.IDLE, list[Transition](), told
+    def __init__(self, on_transition: Callable[[Transition], object] = lambda _: None) -> None:
+        self.phase, self.transitions = Phase.IDLE, list[Transition]()
+        self._on_transition = on_transition
 
     def go(self, phase: Phase, cause: Cause, time: float) -> None:
-        """Makes a transition. Raises RigtwinError for one that does not exist."""
+        """Make a transition. Raise RigtwinError if it is not permitted."""
         if phase not in NEXT[self.phase]:
             ways = " or ".join(after.name.lower() for after in NEXT[self.phase])
             raise RigtwinError(
@@ -92,5 +99,7 @@ class Supervisor:
             )
         transition = Transition(time, self.phase, phase, cause)
         self.phase = phase
+        # The state changes before anybody is informed, so that a failing observer cannot hold it
+        # back.
         self.transitions.append(transition)
-        self._told(transition)
+        self._on_transition(transition)

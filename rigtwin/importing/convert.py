@@ -13,7 +13,7 @@ import numpy as np
 from rigtwin.description import catalogue
 from rigtwin.description.machine import Machine
 from rigtwin.errors import RigtwinError
-from rigtwin.files import keep_apart, recordable, written_whole
+from rigtwin.files import atomic_path, forbid_overwriting, recordable
 from rigtwin.importing.columns import Columns, join
 from rigtwin.importing.derived import evaluate, unwrap
 from rigtwin.importing.episodes import Episode, split_episodes
@@ -114,7 +114,7 @@ def convert(
     RigtwinError
         Before anything is written. Also if the data hold several episodes.
     """
-    recordable(keep_apart(out, *_files(data, mapping)))
+    recordable(forbid_overwriting(out, *_files(data, mapping)))
     wanted = load(mapping)
     imported = read_channels(data, wanted)
     return [*imported.report, _write(out, wanted, _machine(wanted, machine), imported)]
@@ -467,7 +467,7 @@ def _write(out: Path, wanted: Map, machine: Machine | None, imported: Imported) 
         fields.setdefault(topic, []).append(field)
     name = wanted.machine if machine is None else machine.name
     with (
-        written_whole(out) as beside,
+        atomic_path(out) as beside,
         Writer(
             beside,
             wanted.experiment,

@@ -1,6 +1,9 @@
-"""Base parameters: the sums of inertial parameters that are all that the forces of joints can ever
-show of bodies and rotors (Gautier and Khalil, IEEE Transactions on Robotics and Automation 6(3),
-1990; numerically, as in Gautier, Journal of Robotic Systems 8(4), 1991).
+"""Base parameters: the combinations of inertial parameters that joint forces can identify.
+
+A joint's force is linear in the inertial parameters of bodies and rotors. Columns of that regressor
+that are linearly dependent for every motion can only be identified as a sum (Gautier and Khalil,
+IEEE Transactions on Robotics and Automation 6(3), 1990). The dependencies are computed numerically,
+as in Gautier, Journal of Robotic Systems 8(4), 1991.
 """
 
 from __future__ import annotations
@@ -16,30 +19,31 @@ from rigtwin.models.rigid import RigidBodies
 from rigtwin.numerics.arrays import Array
 
 STATES, SEED = 200, 23
-"""Motions of all joints that are made up, each a moment, and where their random numbers begin."""
+"""Number of random joint states in the regressor, and the seed they are drawn with."""
 SPREAD = (1.0, 2.0, 10.0)
-"""rms of positions, velocities and accelerations, in rad or m and seconds."""
+"""RMS of positions, velocities and accelerations, in rad or m and their derivatives by s."""
 DEPENDENT = 1e-8
-"""Share of a column's length that others leave of it, below which it is their sum."""
+"""Relative residual of a column below which it counts as linearly dependent on earlier columns."""
 COUNTS = 1e-6
-"""Least coefficient that is no rounding."""
+"""Coefficients below this are rounding errors and are dropped."""
 
 
 def find_base_parameters(machine: Machine) -> tuple[Mapping[str, float], ...]:
-    """What of the inertia of a machine's bodies and rotors can be seen, whatever it does.
+    """Return the identifiable combinations of the inertial parameters of bodies and rotors.
 
     Parameters
     ----------
     machine
-        Of joints that act on each other and move as measured, with bodies among its components;
-        all other bodies are taken as known.
+        Machine whose joints act on each other and follow a prescribed motion, with bodies among
+        its components. All other bodies are taken as known.
 
     Returns
     -------
     tuple of mappings
-        The base parameters, independent of each other: parameter → its coefficient in the sum, that
-        of the first 1. A parameter is `component.name`, with the names of `INERTIAL`, or `inertia`
-        of a rotor; one that is in no sum is never seen. Empty for other machines.
+        Base parameters, linearly independent of each other. Each maps a parameter to its
+        coefficient in the sum; the first coefficient is 1. Parameters are named `component.name`
+        with the names of `INERTIAL`, or `inertia` of a rotor. A parameter in none of the sums is
+        unidentifiable. Empty for all other machines.
     """
     plant, components = machine.plant, machine.components
     at: dict[type, list[Component]] = {Body: [], Rotor: [], Guide: []}
@@ -50,38 +54,51 @@ def find_base_parameters(machine: Machine) -> tuple[Mapping[str, float], ...]:
     (replay,) = machine.replays
     joints = [components[name].joint for name in replay.moved_by]
     rows = [joints.index(components[row.name].joint) for row in replay.rows]
+    # A random state excites all joints at once, so the regressor has the rank that any motion of
+    # the machine could reach.
     random = np.random.default_rng(SEED)
     motion = random.standard_normal((3, len(joints), STATES)) * np.reshape(SPREAD, (3, 1, 1))
     bodies = RigidBodies(machine.model, joints, at[Guide], at[Rotor])
     columns: dict[str, Array] = {}
+    # A rotor adds its inertia times the acceleration of its shaft, which the ratios in `acts_on`
+    # map to and from the joints.
     for rotor in at[Rotor]:
         along = np.array([dict(rotor.acts_on).get(joint, 0.0) for joint in joints])
         columns[f"{rotor.name}.inertia"] = np.outer(along, along @ motion[2])[rows].ravel()
-    # What is further out is said in terms of what is further in.
+    # Bodies follow from the base outwards, so that the parameters of outer bodies are expressed
+    # by those of inner ones.
     for body in at[Body]:
-        found = bodies.regressor(motion, body.mjcf)[:, rows].reshape(len(INERTIAL), -1)
-        columns |= {f"{body.name}.{word}": each for word, each in zip(INERTIAL, found, strict=True)}
+        regressor = bodies.regressor(motion, body.mjcf)[:, rows].reshape(len(INERTIAL), -1)
+        names = [f"{body.name}.{word}" for word in INERTIAL]
+        columns |= dict(zip(names, regressor, strict=True))
     return _sum_up(columns)
 
 
 def _sum_up(columns: Mapping[str, Array]) -> tuple[Mapping[str, float], ...]:
-    """Independent sums of columns' parameters: a column that is a sum of those before adds its
-    parameter to theirs."""
+    """Return the independent sums of the columns' parameters.
+
+    A column that depends linearly on earlier columns adds its parameter to their sums.
+    """
+    """
+    """
     chosen: list[str] = []
     sums: dict[str, dict[str, float]] = {}
     for name, column in columns.items():
         size = float(np.linalg.norm(column))
+        # A zero column belongs to a parameter that no force depends on.
         if size == 0.0:
             continue
-        before = np.stack([columns[each] for each in chosen], axis=1) if chosen else None
+        before = np.stack([columns[name] for name in chosen], axis=1) if chosen else None
         if before is not None:
             lengths = np.linalg.norm(before, axis=0)
+            # Columns differ in unit and size; without this scaling lstsq would judge rank by unit.
             shares = np.linalg.lstsq(before / lengths, column, rcond=None)[0] / lengths
             if float(np.linalg.norm(column - before @ shares)) < DEPENDENT * size:
-                for each, share in zip(chosen, shares, strict=True):
+                for independent, share in zip(chosen, shares, strict=True):
                     if abs(share) > COUNTS:
-                        sums[each][name] = float(share)
+                        sums[independent][name] = float(share)
                 continue
+        # An independent column starts a new sum, in which its own coefficient is 1.
         chosen.append(name)
         sums[name] = {name: 1.0}
     return tuple(sums.values())

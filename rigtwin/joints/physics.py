@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from rigtwin.hardware.daq.signals import Signals
     from rigtwin.hardware.daq.table import ChannelTable
     from rigtwin.hardware.daq.wired import Wired
-    from rigtwin.hardware.session.own_controller import OwnController
+    from rigtwin.hardware.session.custom_controller import CustomController
     from rigtwin.hardware.session.test import AnyTest
     from rigtwin.models.model import Model
     from rigtwin.render.curves import Curve
@@ -171,13 +171,13 @@ class IndependentJoints(Physics):
         seed: int,
         table: ChannelTable,
         effects: Sequence[str],
-        own: OwnController | None,
+        controller: CustomController | None,
     ) -> AnyTest:
         from rigtwin.hardware.session.test import MachineTest
 
         demands = experiment.demands(configuration, seed)
         name = experiment.name
-        return MachineTest(machine, name, configuration, demands, seed, table, effects, own)
+        return MachineTest(machine, name, configuration, demands, seed, table, effects, controller)
 
     def joint_positions(
         self, machine: Machine, columns: Columns, period: float

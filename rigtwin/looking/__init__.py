@@ -1,4 +1,4 @@
-"""The gap between a recording and its twin, felt by moving the candidate effects by hand."""
+"""A look at the gap between a recording and its twin, while candidate effects are moved by hand."""
 
 from rigtwin.looking.look import Look
 from rigtwin.looking.prediction import Prediction

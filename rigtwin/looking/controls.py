@@ -1,4 +1,4 @@
-"""Ticks and sliders of the candidate effects on a page."""
+"""Check boxes and sliders of the candidate effects on a page."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from rigtwin.looking.knob import Knob, knob_of
 from rigtwin.looking.look import Look
 
 FEW = 8
-"""Sliders of a machine up to which all folders are open."""
+"""Number of sliders up to which all folders are open."""
 
 
 class Controls:
-    """Which effects are in the twin, and their values. Every tab shows the same."""
+    """Selection of the twin's effects, and their values. Every browser tab shows the same."""
 
     def __init__(
         self,
@@ -24,9 +24,24 @@ class Controls:
         first: Iterable[str],
         changed: Callable[[], object],
     ) -> None:
-        """first: effects that come before the others; changed: called when somebody moves one."""
+        """Build the controls.
+
+        Parameters
+        ----------
+        server
+            Server of the page.
+        look
+            Look at the recording.
+        first
+            Effects listed before all others.
+        changed
+            Function called when a user moves a control.
+        """
         self._look, self._changed = look, changed
+        # viser calls handlers on threads of its own; `set` runs on the predicting thread.
         self._lock = threading.RLock()
+        # A dictionary serves as an ordered set: effects stay in the order in which they were
+        # chosen.
         self._ticked: dict[str, None] = {}
         self._values = {
             name: [slider.nominal if n == 0 else slider.start for n, slider in enumerate(sliders)]
@@ -37,6 +52,7 @@ class Controls:
         }
         self._ticks: dict[str, viser.GuiCheckboxHandle] = {}
         self._handles: dict[str, list[viser.GuiSliderHandle[float]]] = {}
+        # A slider has finitely many positions: values start on the nearest one.
         for name, knobs in self._knobs.items():
             self._values[name] = [
                 knob.value(knob.position(value))
@@ -45,12 +61,13 @@ class Controls:
         for title, names, opened in self._folders(tuple(first)):
             with server.gui.add_folder(title, expand_by_default=opened):
                 for name in names:
-                    # In its component's folder an effect's kind says all.
+                    # The folder is named after the component, so the effect's kind is enough.
                     full = title != look.effects[name].component
                     self._add(server, name, name if full else look.effects[name].kind.name)
 
     def _folders(self, first: tuple[str, ...]) -> list[tuple[str, list[str], bool]]:
-        """Titles, effects, and whether they are open."""
+        """Return each folder's title, effects, and whether it is open."""
+        # Effects of the diagnosis come first, in an open folder.
         folders = [("found", list(first), True)] if first else []
         by_component: dict[str, list[str]] = {}
         for name, effect in self._look.effects.items():
@@ -83,13 +100,14 @@ class Controls:
 
     @property
     def values(self) -> dict[str, tuple[float, ...]]:
-        """Of the effects that are in the twin."""
+        """Values of the effects that are in the twin."""
         with self._lock:
             return {name: tuple(self._values[name]) for name in self._ticked}
 
     def set(self, values: Mapping[str, Iterable[float]]) -> None:
-        """Takes these effects into the twin, and all others out of it."""
+        """Put these effects into the twin, and take all others out."""
         with self._lock:
+            # A copy of the names: unticking changes the dictionary.
             for name in [name for name in self._ticked if name not in values]:
                 self._untick(name)
             for name, numbers in values.items():
@@ -102,15 +120,17 @@ class Controls:
                     handle.label = knob.label(value)
 
     def lock(self, locked: bool) -> None:
-        """Lets nobody move anything, or everybody again."""
+        """Lock or unlock all controls."""
         for name, tick in self._ticks.items():
             tick.disabled = locked
             for handle in self._handles[name]:
                 handle.disabled = locked
 
     def _tick(self, name: str) -> None:
-        for other in self._look.clashing(name, [each for each in self._ticked if each != name]):
-            self._untick(other)
+        # Two effects that set the same parameter exclude each other.
+        active = [effect for effect in self._ticked if effect != name]
+        for rival in self._look.clashing(name, active):
+            self._untick(rival)
         self._ticked[name] = None
         self._ticks[name].value = True
 
@@ -120,7 +140,7 @@ class Controls:
 
     def _on_tick(self, name: str, event: viser.GuiEvent[viser.GuiCheckboxHandle]) -> None:
         if event.client_id is None:
-            return  # set here, not by somebody
+            return  # set by the program, not by a user
         with self._lock:
             (self._tick if event.target.value else self._untick)(name)
         self._changed()
@@ -137,6 +157,7 @@ class Controls:
         with self._lock:
             value = knob.value(event.target.value)
             self._values[name][number] = value
+            # On a logarithmic scale only the label shows the value itself.
             event.target.label = knob.label(value)
             self._tick(name)
         self._changed()

@@ -1,4 +1,4 @@
-"""A slider as it stands on a page: its scale and the digits that are shown."""
+"""Appearance of a slider on a page: its scale, and the digits shown."""
 
 from __future__ import annotations
 
@@ -9,15 +9,28 @@ from rigtwin.looking.scale import shorten
 from rigtwin.looking.slider import Slider
 
 POSITIONS = 400
-"""Of a slider, at least so many."""
+"""Minimum number of positions of a slider."""
 WIDE = 30.0
-"""Ratio of a positive range's ends from which its scale is logarithmic."""
+"""Ratio of the ends of a positive range from which the scale is logarithmic."""
 
 
 @dataclass(frozen=True)
 class Knob:
-    """low, high, step: of the positions; logarithmic: whether positions are decimal logarithms;
-    factor: what a value is multiplied by where they are not; unit: of the positions then."""
+    """Scale of a slider.
+
+    Attributes
+    ----------
+    slider
+        Parameter and range.
+    low, high, step
+        Range and step of the positions.
+    logarithmic
+        Whether positions are decimal logarithms of values.
+    factor
+        Factor from values to positions of a linear scale.
+    unit
+        Unit of the positions of a linear scale.
+    """
 
     slider: Slider
     low: float
@@ -28,7 +41,7 @@ class Knob:
     unit: str
 
     def label(self, value: float) -> str:
-        """What is written beside it: of a logarithm, the value itself too."""
+        """Return the slider's label; on a logarithmic scale it contains the value."""
         name = self.slider.parameter
         if self.logarithmic:
             return f"{name} {value:.3g} {self.unit}".strip()
@@ -36,12 +49,13 @@ class Knob:
 
     @property
     def ends(self) -> tuple[str, str]:
-        """What is written under its ends, in the unit of `label`."""
+        """Texts below both ends, in the unit of `label`."""
         scale = 1.0 if self.logarithmic else self.factor
         return f"{scale * self.slider.low:.4g}", f"{scale * self.slider.high:.4g}"
 
     def position(self, value: float) -> float:
-        """Where a value is, at an end if it is beyond."""
+        """Return the position of a value; values out of range are at an end."""
+        # A value without a nominal, such as an absent limit, is shown at the lower end.
         if math.isnan(value):
             return self.low
         inside = min(max(value, self.slider.low), self.slider.high)
@@ -49,14 +63,18 @@ class Knob:
         return min(max(scaled, self.low), self.high)
 
     def value(self, position: float) -> float:
-        """What a position means, in the slider's unit and within its range."""
+        """Return the value of a position, in the slider's unit and within its range."""
         meant = 10.0**position if self.logarithmic else position / self.factor
         return min(max(meant, self.slider.low), self.slider.high)
 
 
 def knob_of(slider: Slider) -> Knob:
-    """The scale of a slider: logarithmic where all of a wide range is positive, in thousandths or
-    other powers of the unit where its numbers would be long."""
+    """Return the scale of a slider.
+
+    A wide positive range has a logarithmic scale. Long numbers are shown in thousandths, or other
+    powers of the unit.
+    """
+    # A logarithm needs positive values, and pays only over a wide range.
     if slider.low > 0.0 and slider.high > WIDE * slider.low:
         low, high = math.log10(slider.low), math.log10(slider.high)
         unit = "" if slider.unit == "1" else slider.unit
@@ -83,5 +101,5 @@ def knob_of(slider: Slider) -> Knob:
 
 
 def _step(low: float, high: float) -> float:
-    """A power of ten that leaves enough positions."""
+    """Return the largest power of ten that leaves enough positions."""
     return 10.0 ** math.floor(math.log10((high - low) / POSITIONS))

@@ -1,6 +1,7 @@
-"""The page of a test that is running: the machine and its twin, the gap as it arises, an alarm.
+"""Page of a running test: the machine and its twin, the gap as it arises, and an alarm.
 
-One thread watches, one draws; when the test is over, the page becomes that of a look at all of it.
+One thread watches the test, another draws. After the test the page becomes a look at the whole
+recording.
 """
 
 from __future__ import annotations
@@ -24,24 +25,37 @@ from rigtwin.numerics.arrays import Array
 from rigtwin.watching import Watch
 
 BEHIND = 1.0
-"""s by which the picture is behind what was recorded, so that it moves evenly while new stretches
-come at times of their own."""
+"""Delay of the picture behind the recording, in s. It lets motion run evenly although new data
+arrive in irregular stretches."""
 LATE = 2.0
-"""s behind, beyond which the picture leaps."""
+"""Delay in s beyond which the picture jumps to the present."""
 
 
 class Follow(Protocol):
-    """Watches a test to its end."""
+    """Function that watches a test to its end."""
 
-    def __call__(self, *, told: Callable[[Watch], object], stop: Callable[[], bool]) -> Watch:
-        """told: called whenever there is something new; stop: says that it shall end."""
+    def __call__(self, *, on_update: Callable[[Watch], object], stop: Callable[[], bool]) -> Watch:
+        """Watch a test to its end.
+
+        Parameters
+        ----------
+        on_update
+            Function called with every new state of the watch.
+        stop
+            Function that returns whether to end early.
+        """
         ...
 
 
 class LivePage:
-    """A test and its twin in the browsers of this computer, until it is closed.
+    """A test and its twin in the browsers of this computer, until the page is closed.
 
-    url: where it is; watch: how the test goes, None before there was enough of it.
+    Attributes
+    ----------
+    url
+        Address of the page.
+    watch
+        State of the test; None until enough was recorded.
     """
 
     def __init__(
@@ -49,25 +63,26 @@ class LivePage:
         server: LocalServer,
         follow: Follow,
         look_back: Callable[[LocalServer, Watch], Page],
-        said: Callable[[str], object],
+        report: Callable[[str], object],
     ) -> None:
-        """
+        """Open the page.
+
         Parameters
         ----------
         server
-            With nothing on it yet; the page stops it.
+            Server without content; the page stops it.
         follow
-            The test.
+            Function that watches the test.
         look_back
-            The page of the whole test.
-        said
-            Called with what there is to say, a line each: an alarm, suspects, why the watch ended
-            early.
+            Function that builds the page of the whole test.
+        report
+            Function called with each message: an alarm, its suspects, or why the watch ended early.
         """
         self._server, self.url = server, server.url
-        self._said, self._last_said = said, ""
+        self._report, self._last_message = report, ""
         self.watch: Watch | None = None
         self._page: Page | None = None
+        # Guards `_closed`, and wakes whoever waits for the page.
         self._wake = threading.Condition()
         self._closed = False
         self._over = threading.Event()
@@ -86,13 +101,14 @@ class LivePage:
 
     @property
     def over(self) -> Page | None:
-        """The page of the whole test, None while it runs."""
+        """Page of the whole test; None while the test runs."""
         return self._page
 
     def wait(self) -> None:
-        """Returns when the page is closed. Raises what went wrong in it."""
+        """Wait until the page is closed. Raise the error that stopped it, if any."""
         while not self._closed and self._failure is None and self._page is None:
             with self._wake:
+                # Short waits, because a wait without timeout cannot be interrupted on Windows.
                 self._wake.wait(0.5)
         if self._failure is not None:
             raise self._failure
@@ -100,7 +116,7 @@ class LivePage:
             self._page.wait()
 
     def close(self) -> None:
-        """Ends the page in all its tabs."""
+        """Close the page in all browser tabs."""
         with self._wake:
             self._closed = True
             self._wake.notify_all()
@@ -122,9 +138,11 @@ class LivePage:
         follow: Follow,
         look_back: Callable[[LocalServer, Watch], Page],
     ) -> None:
+        """Watch the test, then replace the page by a look at the recording."""
         try:
             watch, ended = self._watch_to_its_end(follow)
             self._over.set()
+            # The drawing thread must have ended before its scene is removed.
             self._threads[1].join()
             if self._closed:
                 return
@@ -132,7 +150,7 @@ class LivePage:
             self._page = look_back(self._server, watch)
             if ended:
                 self._page.add_note(ended)
-        except BaseException as error:  # whoever waits for the page is told
+        except BaseException as error:  # handed to the thread that waits for the page
             if not self._closed:
                 self._failure = error
         finally:
@@ -141,9 +159,9 @@ class LivePage:
                 self._wake.notify_all()
 
     def _watch_to_its_end(self, follow: Follow) -> tuple[Watch, str]:
-        """How the test went, and why no more of it was seen; empty if all was."""
+        """Return the final state of the watch, and why it ended early, or an empty text."""
         try:
-            return follow(told=self._take, stop=lambda: self._closed), ""
+            return follow(on_update=self._take, stop=lambda: self._closed), ""
         except RigtwinError as error:
             if self.watch is None:
                 raise
@@ -151,20 +169,25 @@ class LivePage:
             return self.watch, str(error)
 
     def _say(self, line: str) -> None:
-        if line != self._last_said:
-            self._last_said = line
-            self._said(line)
+        """Report a message, unless it repeats the last one."""
+        if line != self._last_message:
+            self._last_message = line
+            self._report(line)
 
     def _take(self, watch: Watch) -> None:
+        """Show a new state of the watch."""
         gap, recording = watch.gap, watch.recording
         if gap is None or recording is None:
             return
         if self._scene is None:
             self._build(watch, gap.time)
+        # The model may use every other tick only; its grid is the gap's.
         period = float(gap.time[1] - gap.time[0])
         measured = find_positions(watch.machine, recording, period)
         predicted = find_positions(watch.machine, recording, period, gap.predicted)
+        # One assignment, so the drawing thread never sees half an update.
         self._positions = gap.time, measured, predicted
+        # At the first alarm the plot shows its signal; afterwards the user's choice stays.
         if watch.alarm is not None and not self._alarmed:
             self._alarmed, self._sensor.value = True, watch.alarm.signal
         self.watch = watch
@@ -174,6 +197,7 @@ class LivePage:
             self._say(str(watch.alarm))
 
     def _build(self, watch: Watch, times: Array) -> None:
+        """Build the page's content once the first stretch is judged."""
         machine, gui = watch.machine, self._server.gui
         moves = predicts_motion(machine)
         panel = gui.add_panel()
@@ -185,49 +209,53 @@ class LivePage:
             self._magnified = gui.add_dropdown(
                 "gap in the picture", tuple(MAGNIFIED), visible=moves
             )
-            said = "solid: the machine as measured; orange: the twin's prediction"
+            legend = "solid: the machine as measured; orange: the twin's prediction"
             gui.add_html(
-                note(f"{said if moves else 'this twin moves as measured'}; {BEHIND:g} s ago")
+                note(f"{legend if moves else 'this twin moves as measured'}; {BEHIND:g} s ago")
             )
         panel.dock_left()
         panel.set_width(WIDTH)
         self._scene = Scene(self._server, machine, moves)
 
     def _plot(self, watch: Watch) -> None:
+        """Draw the chosen sensor as measured and predicted."""
         gap = watch.gap
         if gap is None:
             return
         row = next(n for n, row in enumerate(watch.machine.rows) if row.name == self._sensor.value)
-        # What is not judged yet is bent by the filter's end.
+        # Beyond `judged` the band filter lacks what follows, and distorts the signal.
         known = gap.time < watch.judged
         time, measured, predicted = (
             gap.time[known],
             gap.measured[row][known],
             gap.predicted[row][known],
         )
-        left = measured - predicted
+        residual = measured - predicted
         self._plots.name(
             self._sensor.value,
             watch.machine.rows[row].unit,
             float(np.max(np.abs(measured))),
-            float(np.max(np.abs(left))),
+            float(np.max(np.abs(residual))),
         )
         self._plots.draw(time, measured, [predicted], float(time[-1]))
 
     def _animate(self) -> None:
-        """Moves both machines, a little behind the test."""
+        """Move both machines, a little behind the test."""
         last = time.monotonic()
         while not (self._closed or self._over.wait(FRAME)):
-            here = time.monotonic()
-            passed, last = here - last, here
+            present = time.monotonic()
+            passed, last = present - last, present
             scene, positions = self._scene, self._positions
             if scene is None or positions is None:
                 continue
             times, measured, predicted = positions
             end = float(times[-1])
             self._now += passed
+            # New data may come late or all at once: then the picture jumps.
             if not end - LATE <= self._now <= end:
                 self._now = min(max(self._now, end - BEHIND), end)
+            # The positions come in one tuple, which the watching thread replaces as a whole: no
+            # lock is needed.
             tick = min(int(np.searchsorted(times, self._now)), len(times) - 1)
             scene.draw(
                 {joint: float(values[tick]) for joint, values in measured.items()},

@@ -1,4 +1,4 @@
-"""A viser server that only this computer reaches, and that says nothing of its own."""
+"""A viser server that only this computer can reach, and that prints nothing."""
 
 from __future__ import annotations
 
@@ -17,45 +17,45 @@ from rigtwin.errors import RigtwinError
 HOST = "127.0.0.1"
 PORTS = 65535
 AMBIENT = 0.8
-"""Light from everywhere, so that nothing is black."""
+"""Intensity of ambient light, which keeps shaded faces visible."""
 
 
 class LocalServer(viser.ViserServer):
-    """A server that cannot be asked to share its page with the world."""
+    """A server that refuses to share its page outside this computer."""
 
     @property
     def url(self) -> str:
-        """Where its page is."""
+        """Address of the page."""
         return f"http://{HOST}:{self.get_port()}"
 
     def request_share_url(self, verbose: bool = True) -> str | None:  # noqa: ARG002
-        """Nothing: whatever a page asks for stays here."""
+        """Return None: a page must not be shared, whatever it asks for."""
         return None
 
 
 def open_server(port: int, label: str) -> LocalServer:
-    """Starts a server.
+    """Start a server.
 
     Parameters
     ----------
     port
-        Of this computer; 0 takes a free one.
+        Port on this computer; 0 selects a free one.
     label
         Title of the page's panel.
 
     Returns
     -------
     LocalServer
-        Running.
+        Running server.
 
     Raises
     ------
     RigtwinError
-        If the port is taken or is none.
+        If the port is in use or out of range.
     """
     if not 0 <= port <= PORTS:
         raise RigtwinError(f"port {port}: expected 0 to {PORTS}")
-    # viser goes on to the next port where one is taken; whoever asked for this one would not know.
+    # viser silently uses the next port if one is in use, so the port is probed first.
     with socket.socket() as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
@@ -65,11 +65,14 @@ def open_server(port: int, label: str) -> LocalServer:
                 f"no page on port {port}: {error.strerror}; 0 takes a free one"
             ) from None
         free = int(probe.getsockname()[1])
+    # viser prints a banner and its address, which belong to no command's output.
     with redirect_stdout(io.StringIO()), _for_its_own_pages():
         server = LocalServer(host=HOST, port=free, label=label, verbose=False)
     if server.get_port() != free:
         stop_server(server)
-        raise RigtwinError(f"no page on port {port}: it was taken just now; 0 takes a free one")
+        raise RigtwinError(
+            f"no page on port {port}: another program took it just now; 0 takes a free one"
+        )
     server.gui.configure_theme(control_width="large", show_logo=False, show_share_button=False)
     _light(server)
     return server
@@ -77,17 +80,22 @@ def open_server(port: int, label: str) -> LocalServer:
 
 @contextmanager
 def _for_its_own_pages() -> Iterator[None]:
-    """A server that is started meanwhile answers its own pages alone. Another page of the same
-    browser could otherwise read the recording and press buttons; viser has no option for that."""
+    """Make a server that is started inside this context answer only its own pages.
+
+    Otherwise another page in the same browser could read the recording and press buttons, by
+    cross-site WebSocket hijacking. viser has no option for this, so its WebSocket server is
+    replaced.
+    """
     plain = sockets.serve
 
     def serve(
         handler: Any, host: str, port: int, *, process_request: Callable[..., Any], **options: Any
     ) -> Any:
         hosts = {f"{name}:{port}" for name in (HOST, "localhost")}
-        origins = {f"http://{each}" for each in hosts}
+        origins = {f"http://{host}" for host in hosts}
 
         def answer(connection: Any, request: Any) -> Any:
+            # Host guards against DNS rebinding, Origin against pages of other servers.
             asked, by = request.headers.get_all("Host"), request.headers.get_all("Origin")
             if not set(asked) <= hosts or not set(by) <= origins:
                 return connection.respond(HTTPStatus.FORBIDDEN, "for pages of this server alone\n")
@@ -95,6 +103,7 @@ def _for_its_own_pages() -> Iterator[None]:
 
         return plain(handler, host, port, process_request=answer, **options)
 
+    # viser looks the function up in its module when it starts.
     sockets.serve = serve
     try:
         yield
@@ -103,21 +112,21 @@ def _for_its_own_pages() -> Iterator[None]:
 
 
 def clear(server: LocalServer) -> None:
-    """Takes everything from its page, in all tabs."""
+    """Remove all content from the page, in all tabs."""
     server.gui.reset()
     server.scene.reset()
     _light(server)
 
 
 def _light(server: LocalServer) -> None:
-    # Where there is no graphics card, mirrored surroundings and shadows are most of what a picture
-    # costs, and whoever drags a slider waits for pictures.
+    # Without a graphics card, reflections and shadows cost most of a picture's time, and a user who
+    # drags a slider waits for pictures.
     server.scene.configure_environment_map(None)
     server.scene.configure_default_lights(cast_shadow=False)
     server.scene.add_light_ambient("/light", intensity=AMBIENT)
 
 
 def stop_server(server: LocalServer) -> None:
-    """Ends it and all its connections."""
+    """Stop a server and all its connections."""
     with redirect_stdout(io.StringIO()):
         server.stop()

@@ -1,4 +1,4 @@
-"""One recording beside its twin, while candidate effects are moved."""
+"""One recording beside its twin, whose candidate effects can be changed."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.fit import Fit, clashes, with_values
 from rigtwin.diagnosis.fitter import Fitter
 from rigtwin.errors import RigtwinError
-from rigtwin.files import keep_apart, write_whole
+from rigtwin.files import atomic_write, forbid_overwriting
 from rigtwin.looking.motions import find_positions, predicts_motion
 from rigtwin.looking.prediction import Prediction, judge
 from rigtwin.looking.slider import Slider, sliders_of
@@ -28,20 +28,46 @@ from rigtwin.recording import Recording
 class Look:
     """A recording, its twin, and the effects that the twin may lack.
 
-    effects: candidates by name; sliders: of each, one a parameter; time: s, shape (ticks,);
-    measured: as the model predicts them (in its band, mains line taken out), shape (sensors,
-    ticks); nominal: what the twin predicts as it is. Values of effects are one number a parameter,
-    in the order of the sliders.
+    Values of an effect are one number per parameter, in the order of its sliders.
+
+    Attributes
+    ----------
+    effects
+        Candidate effects by name.
+    sliders
+        Sliders of each effect, one per parameter.
+    time
+        Times in s, shape (ticks,).
+    measured
+        Measured signals in the model's band, without the mains line, shape (sensors, ticks).
+    nominal
+        Prediction of the twin without effects.
     """
 
     def __init__(
         self, machine: Machine, recording: Recording, base: Configuration | None = None
     ) -> None:
-        """base: the twin, by default the described one. Raises RigtwinError naming every fault of
-        the data that makes a comparison meaningless."""
+        """Prepare the model of a recording.
+
+        Parameters
+        ----------
+        machine
+            Machine the recording belongs to.
+        recording
+            Recording to look at.
+        base
+            Configuration of the twin. Defaults to the described one.
+
+        Raises
+        ------
+        RigtwinError
+            If the data make a comparison meaningless; the message names every fault.
+        """
         configuration = machine.configuration_of(recording, base)
+        # Faults of the data are reported before the model is built, which takes seconds.
         require_fit(machine, recording, configuration)
         self.machine, self.recording = machine, recording
+        # The same evidence as a diagnosis: its band, its weights and its noise.
         self._evidence = Evidence(machine, [recording], [configuration])
         self._fitter = Fitter(self._evidence)
         self.effects = {effect.name: effect for effect in machine.effects() if effect.searched}
@@ -58,53 +84,52 @@ class Look:
 
     @property
     def units(self) -> tuple[str, ...]:
-        """Of the observed signals."""
+        """Units of the observed signals."""
         return tuple(row.unit for row in self.machine.rows)
 
     @property
     def predicts_motion(self) -> bool:
-        """Whether any of the observed signals is a motion; else what moves the twin is what was
-        measured."""
+        """Whether any observed signal is a motion; otherwise the twin moves as measured."""
         return predicts_motion(self.machine)
 
     def positions(self, prediction: Prediction | None = None) -> dict[str, Array]:
-        """Where the joints stand.
+        """Return the positions of the joints.
 
         Parameters
         ----------
         prediction
-            Of the twin that is meant; by default the machine itself, as measured.
+            Prediction of a twin. Defaults to the machine itself, as measured.
 
         Returns
         -------
         dict of Array
-            Joint → position, m or rad, shape (ticks,). Of joints that no signal speaks of, nothing.
+            Joint → position, in m or rad, shape (ticks,). Joints without a signal are left out.
         """
         signals = None if prediction is None else prediction.signals
         return find_positions(self.machine, self.recording, self._evidence.lines[0].period, signals)
 
-    def clashing(self, name: str, others: Iterable[str]) -> tuple[str, ...]:
-        """Of other effects, those that set a parameter that this one sets too.
+    def clashing(self, name: str, names: Iterable[str]) -> tuple[str, ...]:
+        """Return the effects that set a parameter which this effect sets too.
 
         Parameters
         ----------
         name
-            Of the one.
-        others
-            Names.
+            Name of the effect.
+        names
+            Names of the effects to compare with.
 
         Returns
         -------
         tuple of str
-            Names.
+            Names of the effects that exclude this one.
 
         Raises
         ------
         RigtwinError
-            For an unknown effect.
+            If an effect is unknown.
         """
         effect = self._find(name)
-        return tuple(each for each in others if clashes(effect, [self._find(each)]))
+        return tuple(rival for rival in names if clashes(effect, [self._find(rival)]))
 
     def _sliders(self, effect: Effect) -> tuple[Slider, ...]:
         low, high = self._fitter.bounds((effect,))
@@ -113,43 +138,47 @@ class Look:
             self._evidence.plant,
             self._fitter.starts(effect).values,
             list(zip(low.tolist(), high.tolist(), strict=True)),
-            [self.machine.unit(effect.group, each) for each in effect.quantities().values()],
+            [
+                self.machine.unit(effect.group, quantity)
+                for quantity in effect.quantities().values()
+            ],
         )
 
     def _find(self, name: str) -> Effect:
         if name not in self.effects:
-            raise RigtwinError(f"unknown effect {name!r}; there are {', '.join(self.effects)}")
+            raise RigtwinError(f"unknown effect {name!r}; expected {', '.join(self.effects)}")
         return self.effects[name]
 
     def _compatible(self, names: Sequence[str]) -> tuple[Effect, ...]:
-        found: list[Effect] = []
+        """Return the effects. Raise RigtwinError if two of them set the same parameter."""
+        effects: list[Effect] = []
         for name in names:
             effect = self._find(name)
-            if clashes(effect, found):
+            if clashes(effect, effects):
                 raise RigtwinError(
                     f"{name} sets a parameter that another effect of {', '.join(names)} sets too"
                 )
-            found.append(effect)
-        return tuple(found)
+            effects.append(effect)
+        return tuple(effects)
 
     def plant(self, values: Mapping[str, Sequence[float]]) -> Plant:
-        """The twin's plant with effects.
+        """Return the twin's plant with effects.
 
         Parameters
         ----------
         values
-            Of the effects, by name.
+            Values of the effects by name.
 
         Returns
         -------
         Plant
-            With them.
+            Parameters of the twin with these effects.
 
         Raises
         ------
         RigtwinError
-            For an unknown effect, two that set the same parameter, or values that are too many, too
-            few or out of bounds.
+            If an effect is unknown, two effects set the same parameter, or values are too many,
+            too few or out of bounds.
         """
         effects = self._compatible(tuple(values))
         for effect, numbers in zip(effects, values.values(), strict=True):
@@ -157,66 +186,69 @@ class Look:
         return with_values(self._evidence.plant, effects, list(values.values()))
 
     def predict(self, values: Mapping[str, Sequence[float]]) -> Prediction:
-        """What the twin with these effects predicts, and how far off it is.
+        """Predict the recording with effects, and return the prediction with its errors.
 
         Parameters
         ----------
         values
-            As `plant` takes them.
+            Values of the effects by name.
 
         Returns
         -------
         Prediction
-            Of the whole recording.
+            Prediction of the whole recording.
 
         Raises
         ------
         RigtwinError
             As `plant` does.
         """
+        # One recording, so one prediction.
         signals = self._evidence.predict(self.plant(values))[0]
         return judge(self.sensors, self._evidence.lines[0], signals)
 
     def fit(self, names: Sequence[str]) -> Fit:
-        """The values of effects that explain the recording best, as a diagnosis fits them.
+        """Fit the values of effects to the recording, as a diagnosis does.
 
         Parameters
         ----------
         names
-            Of the effects that are fitted together, one or more.
+            Names of one or more effects that are fitted together.
 
         Returns
         -------
         Fit
-            Effects, values and their standard deviations.
+            Effects, values and standard deviations.
 
         Raises
         ------
         RigtwinError
-            For none, an unknown effect, or two that set the same parameter.
+            If no effect is named, one is unknown, or two set the same parameter.
         """
         effects = self._compatible(names)
         if not effects:
-            raise RigtwinError(f"no effect to fit; there are {', '.join(self.effects)}")
+            raise RigtwinError(f"no effect to fit; expected some of {', '.join(self.effects)}")
+        # Fits of single effects are the start of the joint fit, which is only a local search.
         alone = [self._fitter.fit_one(self._fitter.screen(effect)) for effect in effects]
-        start = [each.values[0] for each in alone]
+        start = [fit.values[0] for fit in alone]
         together = alone[0] if len(alone) == 1 else self._fitter.refine(effects, start)
+        # Tolerances of other components widen the standard deviations.
         return self._fitter.refit_with_tolerances(together)
 
     def save(self, path: str | Path, values: Mapping[str, Sequence[float]]) -> Path:
-        """Writes the twin with these effects as TOML, for `--config`.
+        """Write the twin with effects as TOML, for `--config`.
 
         Parameters
         ----------
         path
-            Of the new file.
+            Path of the new file.
         values
-            As `plant` takes them.
+            Values of the effects by name.
 
         Returns
         -------
         Path
-            The file.
+            Path of the file.
 
         Raises
         ------
@@ -225,12 +257,13 @@ class Look:
         """
         tables = calibrated.format_changes(self.machine.plant, self.plant(values))
         head = [f"# from {self.recording.path}, effects as set by hand or fitted"]
-        out = keep_apart(path, self.recording.path, *self.machine.files)
-        write_whole(out, "\n".join([*head, *tables]) + "\n")
+        out = forbid_overwriting(path, self.recording.path, *self.machine.files)
+        atomic_write(out, "\n".join([*head, *tables]) + "\n")
         return Path(path)
 
 
 def _check(effect: Effect, numbers: Sequence[float]) -> None:
+    """Raise RigtwinError unless an effect has as many values as parameters, all within bounds."""
     quantities = effect.quantities()
     if len(numbers) != len(quantities):
         raise RigtwinError(

@@ -1,4 +1,4 @@
-"""Where the joints stand, of a machine as measured and of its twin as predicted."""
+"""Positions of the joints, of a machine as measured and of its twin as predicted."""
 
 from __future__ import annotations
 
@@ -7,41 +7,42 @@ from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
 
 MOTIONS = ("position", "velocity")
-"""Kinds of signals that say where a joint stands."""
+"""Kinds of signal that determine a joint's position."""
 
 
 def predicts_motion(machine: Machine) -> bool:
-    """Whether any of the signals that a twin predicts is a motion; else what moves the twin is what
-    was measured."""
+    """Return whether any predicted signal is a motion; otherwise the twin moves as measured."""
     return any(row.kind in MOTIONS for row in machine.rows)
 
 
 def find_positions(
     machine: Machine, recording: Recording, period: float, signals: Array | None = None
 ) -> dict[str, Array]:
-    """Where the joints stand.
+    """Return the positions of the joints.
 
     Parameters
     ----------
     machine
-        That the recording is of.
+        Machine the recording belongs to.
     recording
-        Of it.
+        Recording of the motion.
     period
-        s, from one position to the next; a whole number of the recording's.
+        Time between two positions, in s; a multiple of the recording's period.
     signals
-        What a twin predicts, shape (signals, ticks); None for the machine itself, as measured.
+        Predicted signals, shape (signals, ticks); None for the machine as measured.
 
     Returns
     -------
     dict of Array
-        Joint → position, m or rad, shape (ticks,). Of joints that no signal speaks of, nothing.
+        Joint → position, in m or rad, shape (ticks,). Joints without a signal are left out.
     """
+    # The model's period is a multiple of the recording's.
     every = round(period / recording.period)
     columns = {
         topic: {name: values[::every] for name, values in names.items()}
         for topic, names in recording.columns.items()
     }
+    # Predicted motions replace the measured ones; all other channels stay as recorded.
     if signals is not None:
         for row, signal in zip(machine.rows, signals, strict=True):
             if row.kind in MOTIONS:

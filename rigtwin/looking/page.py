@@ -1,7 +1,7 @@
-"""The page of a look: the machine and its twin, traces, sliders, a fit, and the twin saved.
+"""Page of a look: the machine and its twin, traces, sliders, a fit, and the corrected twin saved.
 
-Three threads share the work, so that whoever drags never waits for what was dragged before: the
-server's take down what is asked for, one predicts and fits what was asked for last, one draws.
+Three threads share the work, so that a user who drags a slider never waits for an earlier request.
+The server's threads note requests, one thread predicts and fits the latest request, one draws.
 """
 
 from __future__ import annotations
@@ -13,31 +13,39 @@ from pathlib import Path
 
 from rigtwin.errors import RigtwinError
 from rigtwin.looking.controls import Controls
-from rigtwin.looking.given import Given
 from rigtwin.looking.local_server import LocalServer, stop_server
 from rigtwin.looking.look import Look
 from rigtwin.looking.prediction import Prediction
 from rigtwin.looking.scene import Scene
-from rigtwin.looking.texts import describe_errors, describe_fit, describe_given, note
+from rigtwin.looking.starting_point import StartingPoint
+from rigtwin.looking.texts import describe_errors, describe_fit, describe_starting_point, note
 from rigtwin.looking.timeline import Timeline
 from rigtwin.numerics.arrays import Array
 
 FRAME = 1.0 / 30.0
-"""s, from one picture to the next while time runs."""
+"""Time between two pictures while the recording plays, in s."""
 PLOTTED = 4
-"""Every so many of them the plots' mark moves too."""
+"""Number of pictures between two updates of the plots' time mark."""
 
 
 class Page:
-    """A look at a recording in the browsers of this computer, until it is closed.
+    """A look at a recording in the browsers of this computer, until the page is closed.
 
-    url: where it is; saved_to: what the save button writes.
+    Attributes
+    ----------
+    url
+        Address of the page.
+    saved_to
+        File that the save button writes.
     """
 
     def __init__(
-        self, server: LocalServer, look: Look, given: Given | None, saved_to: Path
+        self, server: LocalServer, look: Look, start: StartingPoint | None, saved_to: Path
     ) -> None:
-        """server: with nothing on it yet; the page stops it."""
+        """Open the page on a server without content, which the page stops.
+
+        `start` are the effects the sliders begin with; None for the described twin.
+        """
         self._look, self.saved_to = look, saved_to
         self._server = server
         self.url = server.url
@@ -47,11 +55,12 @@ class Page:
         self._job: Callable[[], None] | None = None
         self._moved = True
         self._prediction = look.nominal
+        # Everything is drawn once at the beginning.
         self._stale = {"text", "plots", "scene"}
         self._measured = look.positions()
         self._predicted = self._measured
         try:
-            self._build(given)
+            self._build(start)
         except BaseException:
             stop_server(self._server)
             raise
@@ -62,12 +71,12 @@ class Page:
         for thread in self._threads:
             thread.start()
 
-    def _build(self, given: Given | None) -> None:
+    def _build(self, start: StartingPoint | None) -> None:
         look, gui = self._look, self._server.gui
         self._scene = Scene(self._server, look.machine, look.predicts_motion)
         gui.main_panel.dock_right()
         self._errors = gui.add_html("")
-        self._status = gui.add_html("" if given is None else describe_given(given))
+        self._status = gui.add_html("" if start is None else describe_starting_point(start))
         self._fit_button = gui.add_button(
             "fit what is ticked", hint="finds the values that explain the recording best"
         )
@@ -78,38 +87,38 @@ class Page:
             "write the corrected twin", hint=f"writes {self.saved_to}, for --config"
         )
         self._save_button.on_click(lambda _: self._ask(self._save))
-        values = {} if given is None else given.values
+        values = {} if start is None else start.values
         self._controls = Controls(self._server, look, values, self._on_moved)
         self._controls.set(values)
         self._timeline = Timeline(self._server, look, self._refresh)
+        # A new tab may have been opened while nothing changed.
         self._server.on_client_connect(lambda _: self._refresh())
 
     @property
     def values(self) -> dict[str, tuple[float, ...]]:
-        """Of the effects that are in the twin now."""
+        """Values of the effects that are in the twin now."""
         return self._controls.values
 
     @property
     def prediction(self) -> Prediction:
-        """What the page shows of the twin with these effects, or a moment ago with others."""
+        """Prediction that the page shows; for a moment it may lag behind `values`."""
         return self._prediction
 
     def add_note(self, text: str) -> None:
-        """Says one thing more about the recording."""
+        """Add a remark on the recording."""
         self._status.content = note(text) + self._status.content
 
     def wait(self) -> None:
-        """Returns when the page is closed. Raises what went wrong in it."""
+        """Wait until the page is closed. Raise the error that stopped it, if any."""
         while not self._closed:
             with self._wake:
-                # In short: a wait without an end cannot be interrupted everywhere.
+                # Short waits, because a wait without timeout cannot be interrupted on Windows.
                 self._wake.wait(0.5)
         if self._failure is not None:
             raise self._failure
 
     def close(self) -> None:
-        """Ends the page in all its tabs; a fit that is running is waited for no longer than a
-        moment."""
+        """Close the page in all browser tabs. A running fit is waited for only a moment."""
         with self._wake:
             self._closed = True
             self._wake.notify_all()
@@ -124,39 +133,44 @@ class Page:
         self.close()
 
     def _guard(self, work: Callable[[], None]) -> None:
+        """Run a thread's work; hand an error to the thread that waits for the page."""
         try:
             work()
-        except BaseException as error:  # whoever waits for the page is told
+        except BaseException as error:
             with self._wake:
                 if not self._closed:
                     self._failure, self._closed = error, True
                 self._wake.notify_all()
 
     def _refresh(self, *parts: str) -> None:
+        """Mark parts of the page as stale, and wake the drawing thread."""
         with self._wake:
             self._stale |= set(parts)
             self._wake.notify_all()
 
     def _on_moved(self) -> None:
+        """Request a prediction; several requests before it begins become one."""
         with self._wake:
             self._moved = True
             self._wake.notify_all()
 
     def _ask(self, job: Callable[[], None]) -> None:
-        """One thing at a time: what is asked for while another is done is not done."""
+        """Request a job. While one runs, further requests are dropped, as for a double click."""
         with self._wake:
             if self._job is None:
                 self._job = job
                 self._wake.notify_all()
 
     def _predict(self) -> None:
-        """What was asked for last, until the page is closed."""
+        """Predict the latest request, until the page is closed."""
         while True:
             with self._wake:
                 self._wake.wait_for(lambda: self._moved or self._job or self._closed)
                 if self._closed:
                     return
+                # The flag is cleared before the prediction: a move during it requests the next one.
                 job, self._moved = self._job, False
+            # Outside the lock, so that users can go on dragging during a prediction.
             try:
                 if job is not None:
                     job()
@@ -169,12 +183,14 @@ class Page:
                         self._job = None
 
     def _take(self, prediction: Prediction) -> None:
+        """Show a new prediction."""
         moved = self._look.positions(prediction) if self._look.predicts_motion else self._measured
         with self._wake:
             self._prediction, self._predicted = prediction, moved
         self._refresh("text", "plots", "scene")
 
     def _fit(self) -> None:
+        """Fit the ticked effects, with all controls locked and the time shown."""
         names = list(self._controls.values)
         if not names:
             self._status.content = note("tick what is to be fitted, or move its slider")
@@ -186,6 +202,7 @@ class Page:
                 seconds = time.monotonic() - begun
                 self._status.content = note(f"fitting {' and '.join(names)}: {seconds:.0f} s")
 
+        # A fit starts from the present values, which must not change meanwhile.
         buttons = (self._fit_button, self._reset_button, self._save_button)
         self._controls.lock(True)
         for button in buttons:
@@ -213,15 +230,17 @@ class Page:
         self._status.content = describe_fit(fitted, self._look, time.monotonic() - begun)
 
     def _reset(self) -> None:
+        """Take all effects out of the twin."""
         self._controls.set({})
         self._status.content = ""
 
     def _save(self) -> None:
+        """Write the corrected twin."""
         path = self._look.save(self.saved_to, self._controls.values)
         self._status.content = note(f"the corrected twin is in {path}; use it with --config")
 
     def _draw(self) -> None:
-        """What is no longer so, until the page is closed."""
+        """Draw what is stale, until the page is closed."""
         frame, last = 0, None
         while True:
             with self._wake:
@@ -231,12 +250,14 @@ class Page:
                     self._wake.wait_for(lambda: self._stale or self._closed or self._timeline.plays)
                 if self._closed:
                     return
+                # Taken over at once, so that requests during drawing are kept for the next round.
                 stale, self._stale = self._stale, set()
                 prediction, predicted = self._prediction, self._predicted
-            here = time.monotonic()
+            present = time.monotonic()
             if self._timeline.plays:
-                self._timeline.advance(0.0 if last is None else here - last)
-                frame, last = frame + 1, here
+                self._timeline.advance(0.0 if last is None else present - last)
+                frame, last = frame + 1, present
+                # Plots cost more than the scene, and their mark may move in larger steps.
                 stale |= {"scene"} if frame % PLOTTED else {"scene", "plots"}
             else:
                 last = None
@@ -248,6 +269,7 @@ class Page:
                 self._pose(predicted)
 
     def _pose(self, predicted: Mapping[str, Array]) -> None:
+        """Pose the machine and its ghost at the present time."""
         tick = self._timeline.tick
         self._scene.draw(
             {joint: float(values[tick]) for joint, values in self._measured.items()},

@@ -1,4 +1,4 @@
-"""What a twin with effects of given values predicts of a recording, and how far off it is."""
+"""A twin's prediction of a recording, and its errors."""
 
 from __future__ import annotations
 
@@ -15,11 +15,15 @@ from rigtwin.numerics.arrays import Array
 
 @dataclass(frozen=True)
 class Prediction:
-    """One twin's prediction of one recording.
+    """Prediction of one recording by one twin.
 
-    signals: each sensor's, in its unit, shape (sensors, ticks); percent: by sensor, the rms of
-    measured less predicted in percent of the measured signal's standard deviation, or of its noise
-    where that is larger; overall: the rms of these.
+    Attributes
+    ----------
+    signals
+        Predicted signals in their units, shape (sensors, ticks).
+    percent
+        RMS residual of each sensor, in percent of the measured signal's standard deviation, or of
+        its noise if that is larger.
     """
 
     signals: Array
@@ -27,33 +31,35 @@ class Prediction:
 
     @property
     def overall(self) -> float:
-        """Percent."""
-        return math.sqrt(sum(each**2 for each in self.percent.values()) / len(self.percent))
+        """RMS of all sensors' errors, in percent."""
+        return math.sqrt(sum(error**2 for error in self.percent.values()) / len(self.percent))
 
 
 def judge(sensors: Sequence[str], lines: Lines, signals: Array) -> Prediction:
-    """A prediction with its errors.
+    """Return a prediction with its errors.
 
     Parameters
     ----------
     sensors
-        Names, in the order of the rows.
+        Names of the sensors, in the order of the rows.
     lines
-        The recording as the model predicts it.
+        Recording in the form in which the model predicts it.
     signals
-        Predicted, shape (sensors, ticks).
+        Predicted signals, shape (sensors, ticks).
 
     Returns
     -------
     Prediction
-        Errors are of the ticks that count, as in a diagnosis' report.
+        Prediction with errors over the ticks that count, as in a diagnosis' report.
     """
     percent = {}
     for row, sensor in enumerate(sensors):
+        # The band filter fades at both ends of the recording; those ticks do not count.
         counts = lines.fade[row] > COUNTS
         measured = lines.measured[row][counts]
-        left = measured - signals[row][counts]
+        residual = measured - signals[row][counts]
+        # A signal that hardly moves is compared with its noise, not with its tiny swing.
         swing = max(float(np.std(measured)) if len(measured) else 0.0, float(lines.noise[row]))
-        rms = float(np.sqrt(np.mean(left**2))) if len(left) else 0.0
+        rms = float(np.sqrt(np.mean(residual**2))) if len(residual) else 0.0
         percent[sensor] = 100.0 * rms / swing
     return Prediction(signals, percent)

@@ -1,34 +1,35 @@
-"""Units in which a quantity's numbers are short enough to be read."""
+"""Units in which a quantity's numbers are short enough to read."""
 
 from __future__ import annotations
 
 import math
 
 LEAST, LARGEST = 0.1, 1e5
-"""Between which the largest number of a range is written in the unit itself."""
+"""Range of the largest number that is written in the unit itself."""
 PREFIXED = {"s": "ms", "m": "mm", "V": "mV", "rad": "mrad"}
-"""Unit → a thousandth of it."""
+"""Unit → its thousandth."""
 
 
 def shorten(largest: float, unit: str) -> tuple[float, str]:
-    """A scale for numbers up to a size.
+    """Return the scale and the unit for numbers up to a size.
 
     Parameters
     ----------
     largest
-        Of the numbers, in the unit.
+        Largest number, in the unit.
     unit
-        That they are in; "" or "1" for none.
+        Unit of the numbers; "" or "1" for none.
 
     Returns
     -------
     tuple of float and str
-        What they are multiplied by, and the unit then: the unit itself where they are neither long
-        nor tiny, else a thousandth of it, or another power of a thousand before it.
+        Factor for the numbers, and their unit after it: the unit itself, a thousandth of it, or
+        the unit with another power of a thousand in front.
     """
     unit = "" if unit == "1" else unit
     if not 0.0 < largest < math.inf or LEAST <= largest < LARGEST:
         return 1.0, unit
+    # The next lower power of 1000 that leaves at least one digit before the point.
     power = 3 * math.floor((math.log10(largest) + 1.0) / 3.0)
     named = PREFIXED.get(unit) if power == -3 else None
     return 10.0**-power, named or f"1e{power} {unit}".strip()

@@ -1,4 +1,4 @@
-"""The machine in three dimensions as measured, and the twin's prediction through it as a ghost."""
+"""Three-dimensional view of the machine as measured, with the twin's prediction as a ghost."""
 
 from __future__ import annotations
 
@@ -8,20 +8,20 @@ import numpy as np
 import viser
 
 from rigtwin.description.machine import Machine
-from rigtwin.looking.shapes import Body, Shape
+from rigtwin.looking.shapes import PosedMachine, Shape
 from rigtwin.numerics.arrays import Array
 
 GHOST = (235, 110, 20)
-"""Colour of what the twin predicts, red, green, blue."""
+"""Colour of the twin's prediction: red, green, blue."""
 SEEN_THROUGH = 0.4
 """Opacity of the ghost."""
 
 
 class Scene:
-    """A machine on a page, and its ghost if the twin predicts a motion."""
+    """A machine on a page, with a ghost if the twin predicts a motion."""
 
     def __init__(self, server: viser.ViserServer, machine: Machine, ghost: bool) -> None:
-        self._body = Body(machine)
+        self._body = PosedMachine(machine)
         self._server = server
         shapes = self._body.shapes()
         place, centre, angle = self._body.camera()
@@ -29,6 +29,7 @@ class Scene:
         server.initial_camera.look_at = centre
         server.initial_camera.fov = angle
         self._machine = _add(server, "/machine", shapes)
+        # What cannot move would only cover itself.
         moving = [shape for shape in shapes if shape.moves]
         self._ghost = _add(server, "/ghost", moving, GHOST) if ghost else {}
 
@@ -38,23 +39,24 @@ class Scene:
         predicted: Mapping[str, float],
         magnify: float,
     ) -> None:
-        """Moves both.
+        """Move the machine and its ghost.
 
         Parameters
         ----------
         measured, predicted
-            Joint → position, m or rad.
+            Joint → position, in m or rad.
         magnify
-            How many times as far from the machine as it is the ghost is drawn.
+            Factor by which the ghost's distance from the machine is magnified.
         """
+        # All frames move in one message; otherwise a browser could draw half of the motion.
         with self._server.atomic():
             _place(self._machine, *self._body.poses(measured))
             if self._ghost:
-                apart = {
+                magnified = {
                     joint: position + magnify * (predicted.get(joint, position) - position)
                     for joint, position in measured.items()
                 }
-                _place(self._ghost, *self._body.poses(apart))
+                _place(self._ghost, *self._body.poses(magnified))
 
 
 def _add(
@@ -63,9 +65,10 @@ def _add(
     shapes: list[Shape],
     colour: tuple[int, int, int] | None = None,
 ) -> dict[int, viser.FrameHandle]:
-    """Adds the bodies that have shapes; their frames, by the body's number."""
+    """Add all bodies that have shapes, and return their frames by the body's number."""
     frames: dict[int, viser.FrameHandle] = {}
     for number, shape in enumerate(shapes):
+        # Shapes hang on their body's frame, so a motion moves few objects.
         if shape.body not in frames:
             frames[shape.body] = server.scene.add_frame(f"{name}/{shape.body}", show_axes=False)
         opacity = shape.opacity if colour is None else SEEN_THROUGH
@@ -84,6 +87,7 @@ def _add(
 
 
 def _place(frames: dict[int, viser.FrameHandle], positions: Array, turns: Array) -> None:
+    """Move frames. Unchanged ones are skipped, because every assignment is sent to the browser."""
     for body, frame in frames.items():
         if not np.array_equal(frame.position, positions[body]):
             frame.position = positions[body]

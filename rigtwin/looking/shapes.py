@@ -1,4 +1,4 @@
-"""What a machine looks like: the geoms of its MJCF as triangles, and where its bodies are."""
+"""Shapes of a machine: the geoms of its MJCF as triangles, and the poses of its bodies."""
 
 from __future__ import annotations
 
@@ -17,25 +17,42 @@ from rigtwin.looking.skeleton import draw_bones
 from rigtwin.numerics.arrays import Array
 
 SHOWN_GROUPS = 3
-"""Geoms of groups below this are seen, as in MuJoCo's viewer."""
+"""Geoms of groups below this are shown, as in MuJoCo's viewer."""
 PLANE = 4.0
-"""Times the machine's size that a plane without end is drawn."""
+"""Side of an infinite plane, relative to the machine's size."""
 THIN = 1e-3
-"""The same, of its thickness."""
+"""Thickness of a plane, relative to the machine's size."""
 BONE = (150, 160, 175)
-"""Colour of a body that has no shape, red, green, blue."""
+"""Colour of a body without a shape: red, green, blue."""
 ASPECT = 16.0 / 9.0
-"""Width over height of the pictures that cameras of an MJCF are set for."""
+"""Width over height of the pictures for which the cameras of an MJCF are set."""
 BALL = 2
-"""Subdivisions of an icosahedron that is drawn as a ball."""
+"""Subdivisions of the icosahedron that approximates a ball."""
 
 
 @dataclass(frozen=True)
 class Shape:
-    """One geom. body: number of the body that it is fixed to; moves: whether that one can;
-    vertices: m, in the geom's own frame, shape (vertices, 3); faces: shape (triangles, 3); colour:
-    red, green, blue, 0 to 255; opacity: 0 to 1; edges: whether its faces are flat; position: m, and
-    turn, a quaternion, in the body."""
+    """Shape of one geom.
+
+    Attributes
+    ----------
+    body
+        Number of the body that the geom is fixed to.
+    moves
+        Whether that body can move.
+    vertices
+        Vertices in the geom's frame, in m, shape (vertices, 3).
+    faces
+        Indices of the triangles' vertices, shape (triangles, 3).
+    colour
+        Red, green and blue, 0 to 255.
+    opacity
+        Opacity, 0 to 1.
+    edges
+        Whether the faces are flat.
+    position, turn
+        Pose in the body's frame: position in m, and a quaternion.
+    """
 
     body: int
     moves: bool
@@ -48,8 +65,8 @@ class Shape:
     turn: Array
 
 
-class Body:
-    """A machine's mechanics, posed joint by joint."""
+class PosedMachine:
+    """Mechanics of a machine, posed joint by joint."""
 
     def __init__(self, machine: Machine) -> None:
         """Raises RigtwinError if its MJCF cannot be compiled."""
@@ -61,20 +78,22 @@ class Body:
         self._data = mujoco.MjData(self._model)
 
     def shapes(self) -> list[Shape]:
-        """All that is seen of it. Height fields and signed distances are not drawn."""
+        """Return all visible shapes. Height fields and signed distance fields are left out."""
         model = self._model
-        found = []
+        shapes = []
         for number in range(model.ngeom):
             mesh = _triangles(model, number)
             if mesh is None or model.geom_group[number] >= SHOWN_GROUPS:
                 continue
             material = int(model.geom_matid[number])
+            # As in MuJoCo, a material overrides the geom's own colour.
             rgba = model.geom_rgba[number] if material < 0 else model.mat_rgba[material]
+            # Invisible geoms serve contacts only.
             if rgba[3] <= 0.0:
                 continue
             kind = model.geom_type[number]
-            red, green, blue = (round(255 * float(each)) for each in rgba[:3])
-            found.append(
+            red, green, blue = (round(255 * float(channel)) for channel in rgba[:3])
+            shapes.append(
                 Shape(
                     body=int(model.geom_bodyid[number]),
                     moves=int(model.body_weldid[model.geom_bodyid[number]]) != 0,
@@ -87,17 +106,18 @@ class Body:
                     turn=model.geom_quat[number].copy(),
                 )
             )
-        return [*found, *self._bones({shape.body for shape in found})]
+        return [*shapes, *self._bones({shape.body for shape in shapes})]
 
     def _bones(self, shaped: set[int]) -> list[Shape]:
-        """Of all bodies that move, have a mass, and no shape of their own."""
-        found = []
+        """Return rods for all bodies that move and have a mass, but no shape."""
+        bones = []
         for body in range(1, self._model.nbody):
+            # A body that is welded to the world has the weld number 0.
             moves = int(self._model.body_weldid[body]) != 0
             if body in shaped or not moves or self._model.body_mass[body] <= 0.0:
                 continue
             mesh = draw_bones(self._model, body)
-            found.append(
+            bones.append(
                 Shape(
                     body=body,
                     moves=True,
@@ -110,20 +130,20 @@ class Body:
                     turn=np.array([1.0, 0.0, 0.0, 0.0]),
                 )
             )
-        return found
+        return bones
 
     def poses(self, positions: Mapping[str, float]) -> tuple[Array, Array]:
-        """Where the bodies are.
+        """Return the poses of the bodies.
 
         Parameters
         ----------
         positions
-            Of joints, m or rad; others stay where the MJCF has them.
+            Joint → position, in m or rad. All other joints stay where the MJCF has them.
 
         Returns
         -------
         tuple of Array
-            Positions, m, shape (bodies, 3), and quaternions, shape (bodies, 4).
+            Positions in m, shape (bodies, 3), and quaternions, shape (bodies, 4).
         """
         self._data.qpos[:] = self._model.qpos0
         for joint, position in positions.items():
@@ -132,8 +152,10 @@ class Body:
         return self._data.xpos.copy(), self._data.xquat.copy()
 
     def camera(self) -> tuple[Array, Array, float]:
-        """Where the machine is looked at from, and to, m, and the upright angle of what is seen,
-        rad: as the first camera of the MJCF has it, or from aside and above."""
+        """Return the camera's position and target, in m, and its vertical field of view, in rad.
+
+        The first camera of the MJCF is used; without one, a view from the side and above.
+        """
         mujoco.mj_kinematics(self._model, self._data)
         mujoco.mj_comPos(self._model, self._data)
         mujoco.mj_camlight(self._model, self._data)
@@ -141,7 +163,9 @@ class Body:
         centre = np.array(statistic.center)
         if self._model.ncam:
             place = self._data.cam_xpos[0].copy()
+            # A MuJoCo camera looks along its negative z axis.
             forward = -self._data.cam_xmat[0].reshape(3, 3)[:, 2]
+            # The camera turns about the point nearest to the machine's centre on its line of sight.
             ahead = max(float(forward @ (centre - place)), 0.1 * float(statistic.extent))
             return place, place + ahead * forward, _widen(self._model.cam_fovy[0])
         aside = statistic.extent * np.array([0.7, -1.4, 0.7])
@@ -149,14 +173,17 @@ class Body:
 
 
 def _widen(angle: float) -> float:
-    """The upright angle, rad, of a picture as high as wide, in which is seen what one of `ASPECT`
-    with an upright angle in degrees shows."""
+    """Return the field of view, in rad, of a square picture that shows as much as a wide one.
+
+    `angle` is the vertical field of view of a picture with `ASPECT`, in degrees.
+    """
     return 2.0 * math.atan(ASPECT * math.tan(0.5 * math.radians(angle)))
 
 
 def _triangles(model: mujoco.MjModel, number: int) -> trimesh.Trimesh | None:
-    """A geom in its own frame; None for one that is not drawn."""
+    """Return a geom as triangles in its own frame; None for one that is not drawn."""
     size, kind = model.geom_size[number], model.geom_type[number]
+    # MuJoCo's sizes are half lengths and radii.
     geom, make = mujoco.mjtGeom, trimesh.creation
     if kind == geom.mjGEOM_BOX:
         return make.box(extents=2.0 * size)
@@ -173,6 +200,7 @@ def _triangles(model: mujoco.MjModel, number: int) -> trimesh.Trimesh | None:
         sides = [2.0 * float(side) if side > 0.0 else PLANE * extent for side in size[:2]]
         return make.box(extents=[*sides, THIN * extent])
     if kind == geom.mjGEOM_MESH:
+        # A model's meshes share one array each for vertices and faces.
         mesh = int(model.geom_dataid[number])
         start, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
         first, faces = int(model.mesh_faceadr[mesh]), int(model.mesh_facenum[mesh])

@@ -1,4 +1,4 @@
-"""A parameter of a candidate effect, and the range over which it is moved by hand."""
+"""Parameter of a candidate effect, and its range for moving it by hand."""
 
 from __future__ import annotations
 
@@ -9,13 +9,26 @@ from rigtwin.components import Effect
 from rigtwin.components.plant import Plant
 
 WIDER = 2.0
-"""Times the largest value that a search starts from, to which a slider goes."""
+"""Ratio of a slider's end to the largest value that a search starts from."""
 
 
 @dataclass(frozen=True)
 class Slider:
-    """effect: its name; parameter: of the effect; unit: of its values; low, high: between which it
-    is moved; nominal: the twin's own value; start: where a search for the effect begins."""
+    """Range of one parameter.
+
+    Attributes
+    ----------
+    effect, parameter
+        Names of the effect and of its parameter.
+    unit
+        Unit of the values.
+    low, high
+        Ends of the range.
+    nominal
+        Value of the twin without the effect.
+    start
+        Value from which a search for the effect starts.
+    """
 
     effect: str
     parameter: str
@@ -33,45 +46,46 @@ def sliders_of(
     bounds: Sequence[tuple[float, float]],
     units: Sequence[str],
 ) -> tuple[Slider, ...]:
-    """The sliders of one effect.
+    """Return the sliders of one effect.
 
     Parameters
     ----------
     effect
-        One that is searched for.
+        Effect that a diagnosis searches for.
     plant
-        Without it.
+        Parameters of the twin without the effect.
     tried
-        Values that a search for it starts from, one tuple each in the order of its parameters.
+        Values that a search starts from, one tuple per start in the order of the parameters.
     bounds
-        Between which each parameter is searched.
+        Bounds of each parameter's search.
     units
-        Of each parameter.
+        Unit of each parameter.
 
     Returns
     -------
     tuple of Slider
-        One a parameter. Each reaches from the nominal value to beyond all that a search would try,
+        One slider per parameter. It reaches from the nominal value beyond all starts of a search,
         within the bounds.
     """
-    found = []
+    sliders = []
     for number, (parameter, nominal) in enumerate(effect.nominal(plant).items()):
         low, high = bounds[number]
-        own = [values[number] for values in tried]
-        start = sorted(own)[len(own) // 2]
-        # A limit that is never reached is no end of a scale.
-        here = min(max(nominal, low), WIDER * max(abs(value) for value in own))
-        most = max(here, *(max(value, WIDER * value) for value in own))
-        least = min(here, *(min(value, WIDER * value) for value in own))
-        found.append(
+        starts = [values[number] for values in tried]
+        start = sorted(starts)[len(starts) // 2]
+        # A nominal limit may be practically infinite; it must not stretch the scale.
+        origin = min(max(nominal, low), WIDER * max(abs(value) for value in starts))
+        most = max(origin, *(max(value, WIDER * value) for value in starts))
+        least = min(origin, *(min(value, WIDER * value) for value in starts))
+        sliders.append(
             Slider(
                 effect=effect.name,
                 parameter=parameter,
                 unit=units[number],
+                # The bounds of the search are the last word: beyond them a value has no meaning.
                 low=max(low, least),
                 high=min(high, most),
                 nominal=nominal,
                 start=start,
             )
         )
-    return tuple(found)
+    return tuple(sliders)

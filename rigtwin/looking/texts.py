@@ -1,13 +1,13 @@
-"""What a page says, as HTML."""
+"""Texts of a page as HTML."""
 
 from __future__ import annotations
 
 from html import escape
 
 from rigtwin.diagnosis.fit import Fit
-from rigtwin.looking.given import Given
 from rigtwin.looking.look import Look
 from rigtwin.looking.prediction import Prediction
+from rigtwin.looking.starting_point import StartingPoint
 from rigtwin.watching import Suspect, Watch
 
 STYLE = "margin:0 0.8em 0.5em;font-size:0.85em;line-height:1.35"
@@ -16,12 +16,12 @@ CELL = "padding:0 0 0 1em;text-align:right;font-variant-numeric:tabular-nums"
 
 
 def note(text: str) -> str:
-    """A line of text."""
+    """Return a paragraph of text."""
     return f'<p class="note" style="{STYLE}">{escape(text)}</p>'
 
 
 def describe_errors(look: Look, prediction: Prediction) -> str:
-    """How far off the twin is, sensor by sensor, beside the described one."""
+    """Return a table of every sensor's error, for this twin and the described one."""
     rows = "".join(
         f'<tr><td>{escape(sensor)}</td><td style="{CELL}" data-sensor="{escape(sensor)}">'
         f'{_percent(prediction.percent[sensor])}</td><td style="{CELL}">'
@@ -37,21 +37,22 @@ def describe_errors(look: Look, prediction: Prediction) -> str:
     )
 
 
-def describe_given(given: Given) -> str:
-    """What a diagnosis found."""
-    lines = [given.sentence]
+def describe_starting_point(start: StartingPoint) -> str:
+    """Return the effects of a diagnosis or alarm, with their confidence."""
+    lines = [start.sentence]
     lines += [
         f"{name}: {', '.join(f'{value:.4g}' for value in values)}; confidence "
-        f"{100.0 * given.confidence[name]:.0f} %"
-        for name, values in given.values.items()
+        f"{100.0 * start.confidence[name]:.0f} %"
+        for name, values in start.values.items()
     ]
-    if given.beside:
-        lines.append(f"found too, but no slider moves it: {', '.join(given.beside)}")
+    if start.without_slider:
+        names = ", ".join(start.without_slider)
+        lines.append(f"found too, but no slider moves it: {names}")
     return "".join(note(line) for line in lines)
 
 
 def describe_fit(fitted: Fit, look: Look, seconds: float) -> str:
-    """Values that were fitted, and how sure they are."""
+    """Return fitted values with their standard deviations."""
     lines = [f"fitted in {seconds:.1f} s; plus or minus one standard deviation:"]
     for effect, values, widths in zip(fitted.effects, fitted.values, fitted.widths, strict=True):
         sliders = look.sliders[effect.name]
@@ -63,7 +64,7 @@ def describe_fit(fitted: Fit, look: Look, seconds: float) -> str:
 
 
 def describe_watch(watch: Watch) -> str:
-    """How a test goes that is running."""
+    """Return the state of a running test."""
     alarm = watch.alarm
     said, colour = ("no gap", CALM) if alarm is None else ("alarm", ALARMED)
     head = (
@@ -92,6 +93,7 @@ def describe_watch(watch: Watch) -> str:
 
 
 def _describe_suspect(watch: Watch, suspect: Suspect) -> str:
+    """Return a suspect with its values and probability."""
     machine = watch.machine
     quantities = {effect.name: effect.quantities() for effect in machine.effects()}[suspect.effect]
     values = ", ".join(

@@ -1,4 +1,4 @@
-"""The time that is looked at: dragged or running, and one sensor's traces about it."""
+"""Timeline of a look: the present time, dragged or playing, and one sensor's traces about it."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ RATES = {"as it was": 1.0, "a quarter as fast": 0.25, "a tenth as fast": 0.1}
 MAGNIFIED = {"as it is": 1.0, "10 times": 10.0, "100 times": 100.0}
 WHOLE = "whole test"
 STRETCHES = {WHOLE: np.inf, "10 s": 10.0, "2 s": 2.0, "0.5 s": 0.5}
-"""What is shown about the time that is looked at, s."""
+"""Length of the shown stretch about the present time, in s."""
 WIDTH = 560
-"""Pixels of the panel."""
+"""Width of the panel in pixels."""
 
 
 class Timeline:
-    """A panel with the time, how it runs, and what is shown of it. now: s."""
+    """Panel with the time, its playback, and the traces. `now` is in s."""
 
     def __init__(self, server: viser.ViserServer, look: Look, refresh: Callable[..., None]) -> None:
-        """refresh: called with what is no longer so, "plots" or "scene"."""
+        """Build the panel. `refresh` is called with the stale parts, "plots" or "scene"."""
         self._server, self._look, self._refresh = server, look, refresh
         self.now = float(look.time[0])
         self._magnified: viser.GuiDropdownHandle[str] | None = None
@@ -39,6 +39,7 @@ class Timeline:
 
     def _build(self) -> None:
         look, gui = self._look, self._server.gui
+        # The look begins with the sensor whose gap is largest.
         worst = max(look.nominal.percent, key=lambda name: look.nominal.percent[name])
         start, end = float(look.time[0]), float(look.time[-1])
         self._scrubber = gui.add_slider(
@@ -69,34 +70,34 @@ class Timeline:
         gui.add_html(note("solid: the machine as measured; orange: the twin's prediction"))
 
     def _on_scrubbed(self, event: viser.GuiEvent[viser.GuiSliderHandle[float]]) -> None:
-        if event.client_id is not None:  # by somebody, not by time that runs
+        if event.client_id is not None:  # by a user, not by the playback
             self.now = float(event.target.value)
             self._refresh("plots", "scene")
 
     @property
     def plays(self) -> bool:
-        """Whether time runs: somebody asked for it, and somebody looks."""
+        """Whether the recording plays: a user asked for it, and a browser is connected."""
         return self._play.value and bool(self._server.get_clients())
 
     @property
     def tick(self) -> int:
-        """The tick of `now`."""
+        """Tick of the present time."""
         time = self._look.time
         return min(round((self.now - time[0]) / (time[1] - time[0])), len(time) - 1)
 
     @property
     def magnify(self) -> float:
-        """How many times as far off the ghost is drawn."""
+        """Factor by which the ghost's distance is magnified."""
         return 1.0 if self._magnified is None else MAGNIFIED[self._magnified.value]
 
     def advance(self, seconds: float) -> None:
-        """Lets time go on, at the rate that was chosen; from the end it begins again."""
+        """Advance the playback at the chosen rate; after the end it begins again."""
         start, end = float(self._look.time[0]), float(self._look.time[-1])
         then = self.now + RATES[self._rate.value] * seconds
         self.now = then if then <= end else start
 
     def draw(self, prediction: Prediction) -> None:
-        """Draws the traces of a twin's prediction, and where time is."""
+        """Draw the traces of a prediction, and the mark of the present time."""
         look, sensor = self._look, self._sensor.value
         row = look.sensors.index(sensor)
         measured, nominal = look.measured[row], look.nominal.signals[row]
@@ -109,14 +110,16 @@ class Timeline:
         part = _window(look.time, self.now, STRETCHES[self._stretch.value])
         predicted = [nominal[part], prediction.signals[row][part]]
         self._plots.draw(look.time[part], measured[part], predicted, self.now)
+        # The slider follows the playback; while it is dragged, the user sets it.
         if self.plays:
             self._scrubber.value = self.now
 
 
 def _window(time: Array, now: float, length: float) -> slice:
-    """Ticks of a stretch about a time, moved to lie within the test."""
+    """Return the ticks of a stretch about a time, moved to lie within the test."""
     if length >= time[-1] - time[0]:
         return slice(0, len(time))
     start = min(max(now - 0.5 * length, float(time[0])), float(time[-1]) - length)
+    # At least two ticks, or there would be no line to draw.
     first, last = np.searchsorted(time, [start, start + length])
     return slice(int(first), max(int(last), int(first) + 2))

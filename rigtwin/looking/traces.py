@@ -1,4 +1,4 @@
-"""Traces as they are drawn: never more points than a screen shows."""
+"""Traces reduced to the number of points that a screen can show."""
 
 from __future__ import annotations
 
@@ -9,60 +9,63 @@ import numpy as np
 from rigtwin.numerics.arrays import Array
 
 BUCKETS = 400
-"""Stretches of time of which the least and the largest value are drawn."""
+"""Number of stretches of which the smallest and the largest value are drawn."""
 
 
 def thin(time: Array, traces: Sequence[Array]) -> tuple[Array, list[Array]]:
-    """Traces with no more than 2 · `BUCKETS` points, all peaks kept.
+    """Reduce traces to at most 2 · `BUCKETS` points, with all peaks preserved.
 
     Parameters
     ----------
     time
-        s, rising, shape (ticks,), one tick or more.
+        Times in s, ascending, shape (ticks,), with at least one tick.
     traces
-        Each of shape (ticks,).
+        Traces, each of shape (ticks,).
 
     Returns
     -------
     tuple of Array and list of Array
-        Times and traces, of one length. Where points had to be left out, each two are the least and
-        the largest value of a stretch.
+        Times and traces of equal length. Each pair of points is the minimum and the maximum of a
+        stretch, if points had to be left out.
     """
     if len(time) <= 2 * BUCKETS:
         return time, list(traces)
+    # Equal stretches by ticks; both extremes of each are drawn, in no particular order within it.
     edges = np.linspace(0, len(time), BUCKETS + 1).astype(int)
     starts, middles = edges[:-1], (edges[:-1] + edges[1:]) // 2
     times = np.column_stack([time[starts], time[middles]]).ravel()
-    found = []
+    reduced = []
     for trace in traces:
         least, largest = np.minimum.reduceat(trace, starts), np.maximum.reduceat(trace, starts)
-        found.append(np.column_stack([least, largest]).ravel())
-    return times, found
+        reduced.append(np.column_stack([least, largest]).ravel())
+    return times, reduced
 
 
 def mark(time: Array, traces: Sequence[Array], now: float) -> tuple[Array, ...]:
-    """Traces with an upright line at a time.
+    """Add a vertical line at a time to traces.
 
     Parameters
     ----------
     time
-        s, rising, shape (points,).
+        Times in s, ascending, shape (points,).
     traces
-        Each of shape (points,), one or more.
+        One or more traces, each of shape (points,).
     now
-        s, where the line is.
+        Time of the line, in s.
 
     Returns
     -------
     tuple of Array
-        Times, the traces, and the line as one more trace, which lies at the lowest value of all but
-        for `now`, where it goes to the highest and back.
+        Times, traces, and the line as a further trace. It lies at the lowest value of all traces,
+        and rises to the highest at `now`.
     """
+    # The line is inserted at its place in time, because a plot's times must ascend.
     place = int(np.searchsorted(time, now))
     low = min(float(np.min(trace)) for trace in traces)
     high = max(float(np.max(trace)) for trace in traces)
+    # Three points at the same time let one trace go up and down vertically.
     times = np.insert(time, place, [now, now, now])
-    found = [np.insert(trace, place, [np.interp(now, time, trace)] * 3) for trace in traces]
+    marked = [np.insert(trace, place, [np.interp(now, time, trace)] * 3) for trace in traces]
     line = np.full(len(times), low)
     line[place + 1] = high
-    return (times, *found, line)
+    return (times, *marked, line)

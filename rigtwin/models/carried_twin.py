@@ -15,7 +15,7 @@ from rigtwin.models.inputs import inputs_of_test
 from rigtwin.models.joint import JointModel
 from rigtwin.models.moved_twin import Moved
 from rigtwin.models.reading import sensors_of
-from rigtwin.numerics.arrays import Array, runs_away
+from rigtwin.numerics.arrays import Array, has_diverged
 
 
 def carry(
@@ -60,4 +60,4 @@ def carry(
         row.name: apply_sensor(getattr(plant, row.name), moved[places[row.kind]], period)
         for row in rows
     }
-    return Moved(found, not runs_away(moved))
+    return Moved(found, not has_diverged(moved))

@@ -42,7 +42,7 @@ from rigtwin.models.guided import RIGID
 from rigtwin.models.joint import ELASTIC, KEPT, LIGHTEST, SEED, SMALL, recover_motion
 from rigtwin.models.model import Form, Model
 from rigtwin.models.multibody import Multibody, inertia_at
-from rigtwin.numerics.arrays import Array, contain, interpolate
+from rigtwin.numerics.arrays import Array, clip_diverged, interpolate
 from rigtwin.recording import Inputs
 from rigtwin.signals.noise import smooth, white_noise
 
@@ -355,7 +355,7 @@ class CoupledModel(Model[Plant]):
     def _sense_from(self, plant: Plant) -> Sense:
         """What is observed from any start, for so many ticks."""
         move, besides = self._prepare(plant, {}), self._no_force()
-        return lambda start, ticks: self._sense(plant, contain(move(start, *besides, ticks)))
+        return lambda start, ticks: self._sense(plant, clip_diverged(move(start, *besides, ticks)))
 
     def _judge_start(self) -> None:
         """Find out whether the error of a start as it is read shows."""
@@ -457,7 +457,7 @@ class CoupledModel(Model[Plant]):
         if plain and key in self._last:
             return self._last[key]
         nothing = self._no_force()
-        out = contain(
+        out = clip_diverged(
             self._prepare(plant, shifts or {})(
                 self._start_of(plant),
                 nothing[0] if besides is None else besides,

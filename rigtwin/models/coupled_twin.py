@@ -21,7 +21,7 @@ from rigtwin.models.inputs import inputs_of_test
 from rigtwin.models.moved_twin import Moved
 from rigtwin.models.multibody import Multibody
 from rigtwin.models.stepped_twin import Drive, Sensing, SteppedTwin
-from rigtwin.numerics.arrays import Array, runs_away
+from rigtwin.numerics.arrays import Array, has_diverged
 
 
 class CoupledTwin(CoupledModel):
@@ -197,7 +197,7 @@ def move_freely(
         if row.name not in found:
             true = model.observe(row, moved)
             found[row.name] = apply_sensor(getattr(plant, row.name), true, period)
-    return Moved(found, not runs_away(moved))
+    return Moved(found, not has_diverged(moved))
 
 
 def move_commanded(
@@ -243,7 +243,7 @@ def move_commanded(
             true = model.observe(row, moved)
             found[row.name] = apply_sensor(getattr(plant, row.name), true, period)
     signals = {**found, **readings.signals, **dict(zip(outputs, given, strict=True))}
-    return Moved(signals, not runs_away(moved), frozenset({*readings.signals, *outputs}))
+    return Moved(signals, not has_diverged(moved), frozenset({*readings.signals, *outputs}))
 
 
 def _at_start(

@@ -39,7 +39,7 @@ from rigtwin.models.guided import RIGID, Inertia, Loop, integrate_pushed, invers
 from rigtwin.models.joint_start import AT_REST, JointStart
 from rigtwin.models.model import Form, Model
 from rigtwin.models.start import Start
-from rigtwin.numerics.arrays import Array, contain
+from rigtwin.numerics.arrays import Array, clip_diverged
 from rigtwin.recording import Inputs
 from rigtwin.signals.band import limit_band
 from rigtwin.signals.noise import motion_band, smooth, white_noise
@@ -289,7 +289,7 @@ class JointModel(Model[Plant]):
             )
             if force is not None:
                 out[2] -= force
-        out = contain(out)
+        out = clip_diverged(out)
         if force is None and shift is None:
             self._last = {**dict(list(self._last.items())[-KEPT:]), key: out}
         return out

@@ -9,7 +9,7 @@ import numpy as np
 
 from rigtwin.components.sensors import Sensor, remove_drift
 from rigtwin.models.start import Start, find_slopes, fit_start, read_start, start_error
-from rigtwin.numerics.arrays import Array, contain
+from rigtwin.numerics.arrays import Array, clip_diverged
 from rigtwin.signals.noise import smallest_step, white_noise
 
 SHOWS, FORGOTTEN = 10.0, 0.02
@@ -143,6 +143,6 @@ class JointStart:
 
         def predict(start: Array) -> Array:
             moved = move((float(start[0]), float(start[1])), np.zeros(ticks))
-            return contain(moved[self._row])
+            return clip_diverged(moved[self._row])
 
         return predict

@@ -23,7 +23,7 @@ from rigtwin.description.configuration import Configuration
 from rigtwin.models.basis import Passage, forms
 from rigtwin.models.model import Form, Model
 from rigtwin.models.quarter_car_motion import Plate, move_carriage, move_plate
-from rigtwin.numerics.arrays import Array, contain
+from rigtwin.numerics.arrays import Array, clip_diverged
 from rigtwin.recording import Inputs
 from rigtwin.simulation.converters import sensors
 from rigtwin.simulation.plant import (
@@ -177,7 +177,7 @@ class QuarterCarModel(Model[RigPlant]):
             timestep=timestep,
             steps=self._steps,
         )
-        return contain(out)
+        return clip_diverged(out)
 
     def _displace(self, of: Plate, by: Array) -> Plate:
         if not by.any():

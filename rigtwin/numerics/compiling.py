@@ -1,7 +1,7 @@
-"""Compiled loops that call MuJoCo, kept on disk so that only the first run after a change compiles.
+"""Compiled loops that call MuJoCo, cached on disk so that only changed sources are compiled.
 
-numba's own cache looks at one file's date only; a loop here also depends on the controllers and on
-MuJoCo's version, so the folder is named by a digest of them all.
+numba's own cache checks only the date of one file. A loop here also depends on the controllers and
+on MuJoCo's version. The cache folder is therefore named by a digest of all of them.
 """
 
 from __future__ import annotations
@@ -19,15 +19,16 @@ import numba
 from numba import types
 
 import controllers
-from rigtwin.numerics.kept_code import KeptCode
+from rigtwin.numerics.verified_cache import VerifiedCache
 from rigtwin.system import cache_folder
 
 COMPILED = ("numerics", "components", "simulation", "models")
-"""Folders whose compiled code calls each other's."""
+"""Packages whose compiled functions call each other."""
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
 def _mujoco_library() -> Path:
+    """Return the path of MuJoCo's shared library."""
     folder = Path(mujoco.__file__).parent
     for pattern in ("libmujoco.so*", "libmujoco*.dylib", "mujoco.dll"):
         for path in sorted(folder.glob(pattern)):
@@ -36,15 +37,17 @@ def _mujoco_library() -> Path:
 
 
 def _digest() -> str:
+    """Return a digest of everything that compiled code depends on."""
     digest = hashlib.sha256(f"{version('mujoco')} {version('numba')}".encode())
-    here = Path(__file__).parents[1]
-    for package in (*(here / name for name in COMPILED), Path(controllers.__file__).parent):
+    root = Path(__file__).parents[1]
+    for package in (*(root / name for name in COMPILED), Path(controllers.__file__).parent):
         for source in sorted(package.glob("*.py")):
             digest.update(source.read_bytes())
     return digest.hexdigest()[:16]
 
 
 def _cache_folder() -> Path | None:
+    """Return the cache folder, or None if it cannot be written."""
     folder = cache_folder() / "rigtwin" / _digest()
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -53,6 +56,7 @@ def _cache_folder() -> Path | None:
     return folder if os.access(folder, os.W_OK) else None
 
 
+# Loaded before any kernel is compiled: the linker resolves mj_step and others by name.
 llvmlite.binding.load_library_permanently(str(_mujoco_library()))
 _CACHE = _cache_folder()
 
@@ -60,33 +64,34 @@ _STRUCTURES = (types.intp, types.intp)
 forward = types.ExternalFunction(
     "mj_forwardSkip", types.void(*_STRUCTURES, types.int32, types.int32)
 )
-"""mj_forwardSkip(model, data, stage to skip up to, whether to skip sensors)."""
+"""mj_forwardSkip(model, data, last stage to skip, whether to skip sensors)."""
 inverse = types.ExternalFunction("mj_inverse", types.void(*_STRUCTURES))
-"""mj_inverse(model, data): the forces that a motion takes."""
+"""mj_inverse(model, data): forces that a motion requires."""
 fwd_position = types.ExternalFunction("mj_fwdPosition", types.void(*_STRUCTURES))
-"""mj_fwdPosition(model, data): all that depends on positions."""
+"""mj_fwdPosition(model, data): everything that depends on positions."""
 fwd_velocity = types.ExternalFunction("mj_fwdVelocity", types.void(*_STRUCTURES))
-"""mj_fwdVelocity(model, data): all that depends on velocities, after the former."""
+"""mj_fwdVelocity(model, data): everything that depends on velocities, after mj_fwdPosition."""
 step = types.ExternalFunction("mj_step", types.void(*_STRUCTURES))
-"""mj_step(model, data): a whole step."""
+"""mj_step(model, data): a complete step."""
 integrate = types.ExternalFunction("mj_implicit", types.void(*_STRUCTURES))
-"""mj_implicit(model, data): the second half of a step with the implicit integrators."""
+"""mj_implicit(model, data): second half of a step with the implicit integrators."""
 
 
 def kernel(function: Function) -> Function:
-    """Compiles a function for speed.
+    """Compile a function.
 
-    No Python objects inside, the interpreter lock released, cached on disk. A division by zero
-    gives what it gives in numpy, not an exception.
+    Compiled code uses no Python objects, releases the interpreter lock, and is cached on disk. A
+    division by zero gives numpy's result instead of an exception.
     """
     compiled: Any = numba.njit(nogil=True, error_model="numpy")(function)
     if _CACHE is None:
         return cast(Function, compiled)
+    # numba reads the folder when the cache object is made, so it is set only for that moment.
     before = numba.config.CACHE_DIR  # type: ignore[attr-defined]
     numba.config.CACHE_DIR = str(_CACHE)  # type: ignore[attr-defined]
     try:
-        # As njit(cache=True) does, but with files that are checked.
-        compiled._cache = KeptCode(function)
+        # As njit(cache=True) does, but with files that carry a checksum.
+        compiled._cache = VerifiedCache(function)
     finally:
         numba.config.CACHE_DIR = before  # type: ignore[attr-defined]
     return cast(Function, compiled)

@@ -1,4 +1,4 @@
-"""A delay line: a ring of past samples, read between two of them."""
+"""Delay line: a ring buffer of past samples, interpolated between two of them."""
 
 from __future__ import annotations
 
@@ -9,16 +9,17 @@ from rigtwin.numerics.arrays import Array
 
 
 def ring(delay: float, value: float) -> Array:
-    """A ring long enough for `delay` (in samples), filled with `value`."""
+    """Return a ring buffer for a delay in samples, filled with a value."""
     return np.full(int(delay) + 3, value)
 
 
 @compilable
 def delay_sample(history: Array, memory: Array, delay: float, sample: float) -> float:
-    """Takes a sample and returns the one `delay` samples ago, straight between neighbours.
+    """Store a sample, and return the one `delay` samples ago, by linear interpolation.
 
-    memory[0]: place in the ring.
+    `memory[0]` is the index of the next sample in the ring.
     """
+    # The ring is three samples longer than the delay: the present one, and both neighbours.
     length = len(history)
     place = int(memory[0])
     history[place] = sample

@@ -1,7 +1,4 @@
-"""Recordings: one MCAP file a test.
-
-`Writer` makes them, `load` reads them, `export` turns them into CSV and MAT.
-"""
+"""Recordings: one MCAP file per test, with a `Writer`, `load`, and export to CSV and MAT."""
 
 from rigtwin.recording.inputs import Inputs
 from rigtwin.recording.reader import Recording, load

@@ -1,6 +1,6 @@
-"""The channels of a recording: topic, field, unit, meaning.
+"""Channels of a recording: topic, field, unit and meaning.
 
-Defined once; the file format and every table follow them.
+They are defined here once; the file format and all tables follow them.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from machines import DEFAULT_MACHINE
 
 @dataclass(frozen=True)
 class Channel:
-    """One column of a recording."""
+    """Column of a recording."""
 
     topic: str
     name: str
@@ -53,8 +53,8 @@ SESSION = (
     Channel("/session", "late", "s", "by which the tick began after it was due"),
     Channel("/session", "missed", "tick", "that passed unread before this one"),
 )
-"""Of a supervised session: every tick from arming to rest, the test's own among them. No diagnosis
-reads it."""
+"""Channels of a supervised session: every tick from arming to rest, including the test's. No
+diagnosis reads them."""
 
 
 def channels_of(
@@ -92,7 +92,7 @@ def channels_of(
 
 
 def topic_fields(topic: str) -> tuple[str, ...]:
-    """Field names of a topic, in order."""
+    """Return the field names of a topic in order."""
     return tuple(channel.name for channel in (*CHANNELS, *SESSION) if channel.topic == topic)
 
 

@@ -1,4 +1,4 @@
-"""Columns of numbers out of the messages of a topic, JSON or protobuf."""
+"""Decoding of a topic's messages, JSON or protobuf, into columns of numbers."""
 
 from __future__ import annotations
 
@@ -21,77 +21,83 @@ from rigtwin.recording.schema import decode_rows
 def decode_columns(
     path: Path, channel: Channel, schema: Schema | None, data: list[bytes]
 ) -> dict[str, Array]:
-    """The columns of a topic: every number in it, those that the channel table names first.
+    """Decode the columns of a topic; columns of the channel table come first.
 
     Parameters
     ----------
     path
-        Of the file, for what is said of it.
+        Path of the file, for messages.
     channel, schema
-        Of the topic; a protobuf topic needs its schema.
+        Channel and schema of the topic. A protobuf topic needs its schema.
     data
-        The messages, in order.
+        Messages in order.
 
     Returns
     -------
     dict
-        Each field's values, shape (messages,).
+        Field → values, shape (messages,).
 
     Raises
     ------
     RigtwinError
-        If a message cannot be read, or a field is no number in all of them.
+        If a message cannot be read, or a field is not a number in all of them.
     """
     names = topic_fields(channel.topic)
     if channel.message_encoding == "json":
-        decode: Callable[[bytes], Mapping[str, Any]] = json.loads
+        rows = _json_at_once(data)
+        if rows is None:
+            rows = _decode_singly(path, channel.topic, data, json.loads)
     elif channel.message_encoding == "protobuf":
         if schema is None:
             raise RigtwinError(f"{path}: {channel.topic} is protobuf without a schema")
         present, numbers, decode = _protobuf(path, schema)
-        block = b"".join(data)
-        ours = [
-            *(name for name in names if name in present),
-            *(n for n in present if n not in names),
-        ]
+        # Messages of doubles numbered 1, 2, … have equal lengths: numpy decodes a whole block.
         if numbers == list(range(1, len(present) + 1)):
-            values = decode_rows(block, len(data), len(present))
+            values = decode_rows(b"".join(data), len(data), len(present))
             if values is not None:
-                return {name: values[:, present.index(name)].copy() for name in ours}
+                order = [name for name in names if name in present]
+                order += [name for name in present if name not in names]
+                return {name: values[:, present.index(name)].copy() for name in order}
+        rows = _decode_singly(path, channel.topic, data, decode)
     else:
         raise RigtwinError(
             f"{path}: {channel.topic} is encoded as {channel.message_encoding!r}; "
             "expected json or protobuf"
         )
-    rows = _json_at_once(data) if decode is json.loads else None
-    if rows is None:
-        rows = []
-        for number, item in enumerate(data):
-            try:
-                row = decode(item)
-            except (ValueError, RecursionError, DecodeError):
-                row = None
-            if not isinstance(row, Mapping):
-                raise RigtwinError(
-                    f"{path}: message {number} on {channel.topic} cannot be read; "
-                    "expected an object of numbers"
-                )
-            rows.append(row)
-    ours = [name for name in names if any(name in row for row in rows)]
-    ours += [name for name in _numbers(rows) if name not in ours]
-    if not ours:
+    order = [name for name in names if any(name in row for row in rows)]
+    order += [name for name in _numbers(rows) if name not in order]
+    if not order:
         raise RigtwinError(f"{path}: {channel.topic} has none of the fields {', '.join(names)}")
     return {
         name: _column(path, f"{channel.topic}.{name}", [row.get(name) for row in rows])
-        for name in ours
+        for name in order
     }
 
 
+def _decode_singly(
+    path: Path, topic: str, data: list[bytes], decode: Callable[[bytes], Mapping[str, Any]]
+) -> list[Mapping[str, Any]]:
+    """Decode messages one by one. Raise RigtwinError for the first that cannot be read."""
+    rows = []
+    for number, item in enumerate(data):
+        try:
+            row = decode(item)
+        except (ValueError, RecursionError, DecodeError):
+            row = None
+        if not isinstance(row, Mapping):
+            raise RigtwinError(
+                f"{path}: message {number} on {topic} cannot be read; expected an object of numbers"
+            )
+        rows.append(row)
+    return rows
+
+
 def _json_at_once(data: list[bytes]) -> list[Mapping[str, Any]] | None:
-    """Flat JSON objects, twice as fast as one by one; None if they are anything else."""
-    if not all(each.count(b"{") == 1 == each.count(b"}") for each in data):
+    """Decode flat JSON objects as one array, twice as fast as singly; None for anything else."""
+    if not all(item.count(b"{") == 1 == item.count(b"}") for item in data):
         return None
     try:
+        # One call of the JSON parser for all messages instead of one call each.
         rows = json.loads(b"[" + b",".join(data) + b"]")
     except (ValueError, RecursionError):
         return None
@@ -100,7 +106,7 @@ def _json_at_once(data: list[bytes]) -> list[Mapping[str, Any]] | None:
 
 
 def _numbers(rows: list[Mapping[str, Any]]) -> list[str]:
-    """Fields that hold numbers throughout."""
+    """Return the fields that are numbers in all messages."""
     return (
         [
             name
@@ -113,8 +119,9 @@ def _numbers(rows: list[Mapping[str, Any]]) -> list[str]:
 
 
 def _column(path: Path, channel: str, values: list[Any]) -> Array:
-    """Numbers as they came; anything else is refused with its place."""
+    """Return the values as an array. Raise RigtwinError for the first that is no number."""
     for number, value in enumerate(values):
+        # An exact test, because a JSON boolean is an int in Python.
         if type(value) is not float and type(value) is not int:
             shown = "missing" if value is None else f"{value!r:.40}"
             raise RigtwinError(
@@ -129,21 +136,26 @@ def _column(path: Path, channel: str, values: list[Any]) -> Array:
 def _protobuf(
     path: Path, schema: Schema
 ) -> tuple[list[str], list[int], Callable[[bytes], Mapping[str, Any]]]:
-    """Field names and numbers of a message type, and a decoder that takes anything of that type."""
+    """Return field names and numbers of a message type, and a decoder of its messages.
+
+    The numbers are empty unless all fields are doubles.
+    """
     try:
         files = descriptor_pb2.FileDescriptorSet.FromString(schema.data)
+        # A pool of its own: two files may define the same type differently.
         pool = descriptor_pool.DescriptorPool()
         for file in files.file:
             pool.Add(file)
-        found = pool.FindMessageTypeByName(schema.name)
+        kind = pool.FindMessageTypeByName(schema.name)
     except (KeyError, TypeError, DecodeError) as error:
         raise RigtwinError(f"{path}: schema {schema.name!r} cannot be read: {error}") from None
-    names = [item.name for item in found.fields]
-    doubles = all(item.type == item.TYPE_DOUBLE for item in found.fields)
-    kind = message_factory.GetMessageClass(found)
+    names = [item.name for item in kind.fields]
+    # Other types have other lengths; they are decoded one by one.
+    doubles = all(item.type == item.TYPE_DOUBLE for item in kind.fields)
+    message_class = message_factory.GetMessageClass(kind)
 
     def decode(item: bytes) -> Mapping[str, Any]:
-        message = kind.FromString(item)
+        message = message_class.FromString(item)
         return {name: getattr(message, name) for name in names}
 
-    return names, [item.number for item in found.fields] if doubles else [], decode
+    return names, [item.number for item in kind.fields] if doubles else [], decode

@@ -1,4 +1,4 @@
-"""A recording that somebody else is still writing."""
+"""Reader of a recording that another program is still writing."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from mcap.stream_reader import StreamReader
 from mcap.writer import MCAP0_MAGIC
 
 from rigtwin.errors import RigtwinError
-from rigtwin.recording.reader import Gathered, Recording
+from rigtwin.recording.reader import FileContent, Recording
 from rigtwin.recording.records import (
     CHUNK_HEAD,
     DAMAGE,
@@ -34,16 +34,21 @@ LONGEST = 2**26
 
 
 class GrowingRecording:
-    """The last seconds of a file that grows, or of one that is whole already.
+    """The last seconds of a file that grows, or of a complete one.
 
-    ended: whether the file says that its test is over.
+    Attributes
+    ----------
+    path
+        Path of the file.
+    ended
+        Whether the file says that its test is over.
     """
 
     def __init__(self, path: Path, window: float) -> None:
-        """window: s, what is kept of it."""
+        """Prepare to read a file, keeping a window of its last seconds."""
         self.path = path
         self._window = window
-        self._gathered = Gathered()
+        self._content = FileContent()
         self._read, self._begun, self._over = 0, False, False
         self._buffer, self._at = bytearray(), 0
         self._lost, self._searched = False, 0
@@ -51,17 +56,16 @@ class GrowingRecording:
 
     @property
     def latest(self) -> float:
-        """Time of the last tick read, s."""
-        return self._gathered.latest
+        """Time of the last tick read, in s."""
+        return self._content.latest
 
     def read(self, until: float = float("inf")) -> bool:
-        """Takes what was added to the file since the last call.
+        """Read what was added to the file since the last call.
 
         Parameters
         ----------
         until
-            s; a test that goes on longer is taken up to there or a little later, the rest by the
-            next calls.
+            Time in s at which reading pauses, at once or a little later. The next calls continue.
 
         Returns
         -------
@@ -76,6 +80,7 @@ class GrowingRecording:
         before = self.latest
         try:
             with self.path.open("rb") as file:
+                # A file that shrinks was replaced: what was read so far belongs to another test.
                 if file.seek(0, io.SEEK_END) < self._read:
                     raise RigtwinError(f"{self.path} was replaced while it was read")
                 file.seek(self._read)
@@ -89,13 +94,13 @@ class GrowingRecording:
                     self._append(added)
         except OSError as error:
             raise RigtwinError(f"cannot read {self.path}: {error.strerror}") from None
-        self._gathered.forget(self.latest - self._window)
-        self.ended = self._gathered.ended
+        self._content.forget(self.latest - self._window)
+        self.ended = self._content.ended
         return self.latest > before
 
     def recording(self) -> Recording:
-        """What was kept of it. Raises RigtwinError if it is no recording or has no ticks yet."""
-        return self._gathered.build(self.path)
+        """Return the window. Raise RigtwinError if there is no recording or no tick yet."""
+        return self._content.build(self.path)
 
     def _append(self, added: bytes) -> None:
         """Adds bytes of the file to those that wait, without what was taken."""
@@ -136,7 +141,7 @@ class GrowingRecording:
         return True
 
     def _note_damage(self) -> None:
-        self._gathered.add(Lost())
+        self._content.add(Lost())
         self._lost, self._searched = True, self._at + 1
 
     def _find_chunk(self) -> bool:
@@ -157,7 +162,7 @@ class GrowingRecording:
         self._searched = max(len(self._buffer) - CHUNK_HEAD, self._at)
         if found is None:
             return False
-        self._gathered.add(Lost())
+        self._content.add(Lost())
         self._at = found
         return True
 
@@ -176,9 +181,10 @@ class GrowingRecording:
                 return False
             parts = take_apart(whole) if isinstance(whole, Chunk) else [whole]
             for part in parts:
-                self._gathered.add(part)
+                self._content.add(part)
         except InvalidMagic:
             raise RigtwinError(f"{self.path} is not an MCAP file") from None
+        # Damage in a growing file is noted like in a complete one, and reading goes on.
         except DAMAGE:
             return False
         return True

@@ -1,4 +1,4 @@
-"""A file that one program alone writes."""
+"""Exclusive access to a file that a program writes."""
 
 from __future__ import annotations
 
@@ -12,28 +12,32 @@ from rigtwin.system import lock_file
 
 
 def open_alone(path: Path) -> BinaryIO:
-    """Opens a file to be written from its beginning, for as long as it is open by nobody else.
+    """Open a file for writing from its beginning, exclusively for as long as it is open.
+
+    The file is truncated only after it is locked: a second writer must not destroy the first's.
 
     Parameters
     ----------
     path
-        Replaced if it is there, but only once it is this program's own.
+        Path of the file, which is replaced if it exists.
 
     Returns
     -------
     BinaryIO
-        Without a buffer.
+        Unbuffered file.
 
     Raises
     ------
     RigtwinError
-        If another program is writing it.
+        If another program is writing the file.
     OSError
-        If it cannot be written.
+        If the file cannot be written.
     """
+    # Windows would otherwise translate line ends.
     binary = getattr(os, "O_BINARY", 0)
     handle = os.open(path, os.O_RDWR | os.O_CREAT | binary, 0o666)
     try:
+        # Devices and pipes cannot be locked or truncated.
         if stat.S_ISREG(os.fstat(handle).st_mode):
             try:
                 lock_file(handle)

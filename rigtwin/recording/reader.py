@@ -1,7 +1,4 @@
-"""Reads recordings, whoever wrote them.
-
-JSON or protobuf messages, whole files or what is left of them.
-"""
+"""Reader of recordings with JSON or protobuf messages, complete or damaged, of any author."""
 
 from __future__ import annotations
 
@@ -47,32 +44,32 @@ recording is refused, above the second it has a note."""
 
 @dataclass(frozen=True)
 class Recording:
-    """One test as recorded.
+    """Recording of one test.
 
     Parameters
     ----------
     path : Path
-        Of the file.
+        Path of the file.
     machine, experiment : str
-        What was tested, and how.
+        Names of the machine and of the experiment.
     period : float
-        s.
+        Period of a tick, in s.
     time : Array
-        s since the start, shape (ticks,).
+        Time since the start in s, shape (ticks,).
     columns : mapping
-        Topic → field → values, shape (ticks,), SI; all topics of one length.
+        Topic → field → values in SI units, shape (ticks,). All topics have the same ticks.
     controller : mapping
-        The operator's settings, empty if the recording does not say.
+        The operator's settings of the controller; empty if they were not recorded.
     twin : mapping
-        How a twin made it, empty of a rig.
+        Origin of a twin's recording; empty for a rig.
     end : str
-        Why the test ended.
+        Reason for the end of the test.
     notes : tuple of str
-        What is wrong or missing, for people.
+        Defects of the file, in words.
     transitions : tuple of mapping
-        Of a supervised session, in order.
+        Transitions of a supervised session in order.
     lateness : mapping
-        Of a loop in real time.
+        Lateness of a loop in real time.
     description : Path or None
         Description of the machine, where the recording remembers one; the file may be gone.
     """
@@ -93,23 +90,25 @@ class Recording:
 
     @property
     def ticks(self) -> int:
+        """Number of ticks."""
         return len(self.time)
 
     def __getitem__(self, channel: str) -> Array:
-        """One channel by `/topic.field`, such as `/sensor.load_cell`.
+        """Return one channel by `/topic.field`, such as `/sensor.load_cell`.
 
-        Raises RigtwinError if it is missing.
+        Raises RigtwinError if the recording lacks it.
         """
         topic, _, name = channel.partition(".")
         return self.column(topic, name)
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """All channels, as `/topic.field`."""
+        """All channels as `/topic.field`."""
         return tuple(f"{topic}.{name}" for topic, names in self.columns.items() for name in names)
 
     def between(self, start: float, stop: float) -> Recording:
-        """The ticks from a time on and before another, s."""
+        """Return the ticks from a time on and before another, in s."""
+        # Half a period of tolerance, because recorded times are rounded.
         first, last = np.searchsorted(self.time, np.array([start, stop]) - 0.5 * self.period)
         if first == 0 and last == self.ticks:
             return self
@@ -120,7 +119,7 @@ class Recording:
         return replace(self, time=np.ascontiguousarray(self.time[first:last]), columns=columns)
 
     def to_pandas(self) -> pandas.DataFrame:
-        """All channels as a table, a column each, by time in s.
+        """Return all channels as a table, one column per channel, indexed by time in s.
 
         Raises
         ------
@@ -156,40 +155,40 @@ class Recording:
 
 
 def load(path: Path) -> Recording:
-    """Reads a recording.
+    """Read a recording.
 
     Parameters
     ----------
     path : Path
-        An MCAP file, whole or damaged.
+        Path of an MCAP file, complete or damaged.
 
     Returns
     -------
     Recording
-        What can be read of it.
+        Everything that can be read.
 
     Raises
     ------
     RigtwinError
-        If it is none, is empty, or is of a format this version does not read.
+        If the file is no recording, is empty, or has a format this version does not read.
     """
-    gathered = Gathered()
+    content = FileContent()
     try:
         with path.open("rb") as file:
             if not file.read(1):
                 raise RigtwinError(f"{path} is empty; expected an MCAP recording")
             file.seek(0)
             for record in read_records(file):
-                gathered.add(record)
+                content.add(record)
     except (InvalidMagic, struct.error):
         raise RigtwinError(f"{path} is not an MCAP file") from None
     except OSError as error:
         raise RigtwinError(f"cannot read {path}: {error.strerror}") from None
-    return gathered.build(path)
+    return content.build(path)
 
 
-class Gathered:
-    """What was read of a file so far."""
+class FileContent:
+    """Content of a file, as far as it was read."""
 
     def __init__(self) -> None:
         self._metadata: dict[str, dict[str, str]] = {}
@@ -207,7 +206,7 @@ class Gathered:
 
     @property
     def latest(self) -> float:
-        """Time of the last tick that every topic with ticks has, s; 0 before there is one."""
+        """Time of the last tick that is present on all topics, in s; 0 without ticks."""
         last = [
             times[-1]
             for number, (times, _) in self._raw.items()
@@ -216,11 +215,12 @@ class Gathered:
         return 1e-9 * min(last, default=0)
 
     def add(self, record: McapRecord | Messages | Lost) -> None:
-        """Takes one record, in the order of the file."""
+        """Add one record, in the order of the file."""
         if isinstance(record, Lost):
             self._lost.append(record)
         elif isinstance(record, Messages):
             times, data = self._raw.setdefault(record.channel_id, ([], []))
+            # Lists grow in place: a long test has millions of messages.
             times += record.times
             data += record.data
         elif isinstance(record, Message):
@@ -232,6 +232,7 @@ class Gathered:
             if not whole:
                 self._doubtful.append(record.name)
             self._metadata[record.name] = values
+            # A full disk makes the writer repeat a transition, so duplicates are dropped.
             if record.name == TRANSITION_RECORD and values not in self._states:
                 self._states.append(values)
         elif isinstance(record, Schema):
@@ -240,30 +241,33 @@ class Gathered:
             self._channels[record.id] = record
 
     def forget(self, before: float) -> None:
-        """Drops the messages of earlier times, s."""
+        """Drop all messages before a time in s."""
         for times, data in self._raw.values():
+            # Messages are in order of time, so a prefix is dropped.
             first = bisect_left(times, round(before * 1e9))
             del times[:first], data[:first]
 
     def build(self, path: Path) -> Recording:
-        """The recording that it makes.
+        """Return the recording.
 
         Parameters
         ----------
         path
-            Of the file, for messages.
+            Path of the file, for messages.
 
         Returns
         -------
         Recording
-            Of all that was taken and not dropped.
+            Recording of all ticks that were added and not dropped.
 
         Raises
         ------
         RigtwinError
-            If it is none, holds no ticks, or is of a format this version does not read.
+            If the content is no recording, holds no ticks, or has a format this version does not
+            read.
         """
         metadata, lost, doubtful = self._metadata, self._lost, self._doubtful
+        # A file without a single readable record is no damaged recording.
         if lost and not metadata and not self._channels:
             raise RigtwinError(f"{path} is not an MCAP file")
         about = metadata.get(RECORD)
@@ -272,7 +276,7 @@ class Gathered:
                 f"{path} is not a rig recording: it has no metadata record {RECORD!r}"
             )
         period = _period(path, about)
-        # What the controller was told is believed only as it was written.
+        # Settings with a wrong checksum would mislead a diagnosis; they are left out.
         controller = {} if RECORD in doubtful else _controller(path, about)
         notes: list[str] = []
         tables = self._tables(path, notes)
@@ -284,13 +288,14 @@ class Gathered:
             )
             raise RigtwinError(f"{path} holds no ticks on {' or '.join(list_topics())}{said}")
         time, columns = _align(tables, notes)
+        # Damage comes first among the notes.
         notes[:0] = _describe_damage(lost, doubtful, time)
         if not len(time):
             raise RigtwinError(
                 f"{path}: {' and '.join(tables)} have no tick in common; "
                 "expected the same times on each"
             )
-        _look_at_times(path, time, period, notes)
+        _check_times(path, time, period, notes)
         return Recording(
             path=path,
             machine=printable(about.get("machine", DEFAULT_MACHINE)),
@@ -310,7 +315,7 @@ class Gathered:
     def _tables(
         self, path: Path, notes: list[str]
     ) -> dict[str, tuple[NDArray[np.int64], dict[str, Array]]]:
-        """Topic → times in ns and columns, as they stand in the file."""
+        """Return times in ns and columns by topic, as they are in the file."""
         tables: dict[str, tuple[NDArray[np.int64], dict[str, Array]]] = {}
         for number, (times, data) in self._raw.items():
             channel = self._channels.get(number)
@@ -318,25 +323,28 @@ class Gathered:
                 continue
             if channel.topic in tables:
                 raise RigtwinError(f"{path}: two channels on {channel.topic}; expected one")
+            # Times are unsigned in the file; half of their range does not fit numpy's int64.
             if max(times) >= 2**63:
                 raise RigtwinError(
                     f"{path}: a message on {channel.topic} has time {max(times)} ns; "
                     "expected ns since the start"
                 )
             values = decode_columns(path, channel, self._schemas.get(channel.schema_id), data)
+            # Times stay in whole nanoseconds until topics are aligned: doubles would not compare
+            # equal.
             stamps = np.array(times, np.int64)
-            _look_at_order(path, channel.topic, stamps, notes)
+            _check_order(path, channel.topic, stamps, notes)
             tables[channel.topic] = (stamps, values)
         return tables
 
 
 def _describe_damage(lost: list[Lost], doubtful: list[str], time: Array) -> list[str]:
-    """What of a file cannot be read, or not believed, for people."""
+    """Describe the parts of a file that cannot be read or trusted."""
     notes = []
-    if any(each.first is None for each in lost):
+    if any(part.first is None for part in lost):
         end = f"; readable up to {time[-1]:.3f} s" if len(time) else ""
         notes.append(f"damaged or cut off{end}")
-    for first, last in dict.fromkeys((each.first, each.last) for each in lost):
+    for first, last in dict.fromkeys((part.first, part.last) for part in lost):
         if first is not None and last is not None:
             notes.append(f"damaged: what was recorded from {first:.3f} to {last:.3f} s is lost")
     if RECORD in doubtful:
@@ -349,47 +357,49 @@ def _describe_damage(lost: list[Lost], doubtful: list[str], time: Array) -> list
 
 
 def transitions(path: Path) -> tuple[Mapping[str, str], ...]:
-    """Reads a supervised session's transitions, even if it ended before its test began.
+    """Read the transitions of a supervised session, even if it ended before its test began.
 
     Parameters
     ----------
     path : Path
-        Of the recording.
+        Path of the recording.
 
     Returns
     -------
     tuple of mapping
-        Those that can be read, in order of time.
+        Transitions that can be read, in order of time.
 
     Raises
     ------
     RigtwinError
         If the file cannot be read at all.
     """
-    found: list[Mapping[str, str]] = []
+    states: list[Mapping[str, str]] = []
     try:
         with path.open("rb") as file:
             for record in read_records(file):
                 if isinstance(record, Metadata) and record.name == TRANSITION_RECORD:
                     values, _ = unseal(record.metadata)
-                    found += [values] if values not in found else []
+                    states += [values] if values not in states else []
     except OSError as error:
         raise RigtwinError(f"cannot read {path}: {error.strerror}") from None
     except (InvalidMagic, struct.error):
         pass
-    return _sort(found)
+    return _sort(states)
 
 
 def _sort(transitions: list[Mapping[str, str]]) -> tuple[Mapping[str, str], ...]:
-    """By time: on a full disk the last ones stand in the room kept near the file's beginning."""
+    """Return transitions by time; on a full disk the last are in space reserved at the start."""
     return tuple(sorted(map(_printable, transitions), key=_moment))
 
 
 def _printable(values: Mapping[str, str]) -> dict[str, str]:
+    """Return metadata that cannot control a terminal."""
     return {printable(name): printable(value) for name, value in values.items()}
 
 
 def _moment(transition: Mapping[str, str]) -> float:
+    """Return the time of a transition in s; infinite if it cannot be read."""
     try:
         return float(transition.get("time", ""))
     except ValueError:
@@ -397,6 +407,8 @@ def _moment(transition: Mapping[str, str]) -> float:
 
 
 def _period(path: Path, about: Mapping[str, str]) -> float:
+    """Return the recorded period in s. Raise RigtwinError if format or period is wrong."""
+    # A later format may mean something else by the same names, so it is refused.
     if about.get("format") != WRITTEN_FORMAT:
         raise RigtwinError(
             f"{path}: format {about.get('format')!r}; this version reads {WRITTEN_FORMAT!r}"
@@ -411,7 +423,9 @@ def _period(path: Path, about: Mapping[str, str]) -> float:
 
 
 def _controller(path: Path, about: Mapping[str, str]) -> Mapping[str, object]:
+    """Return the recorded settings of the controller."""
     try:
+        # Other programs may write recordings without settings.
         config = json.loads(about.get("config", "{}"))
         controller = config.get("controller", {})
         if not isinstance(controller, dict):
@@ -426,9 +440,10 @@ def _controller(path: Path, about: Mapping[str, str]) -> Mapping[str, object]:
     }
 
 
-def _look_at_order(path: Path, topic: str, stamps: NDArray[np.int64], notes: list[str]) -> None:
-    """Stamps as the messages stand in the file. Raises RigtwinError if they run backwards."""
+def _check_order(path: Path, topic: str, stamps: NDArray[np.int64], notes: list[str]) -> None:
+    """Note messages that are out of order. Raise RigtwinError if most of them are."""
     falls = int(np.sum(np.diff(stamps) < 0))
+    # A few messages out of order are normal for several writers; a reversed clock is not.
     if 2 * falls > len(stamps) - 1:
         raise RigtwinError(
             f"{path}: time on {topic} runs backwards, from {stamps[0] * 1e-9:.3f} s to "
@@ -441,12 +456,13 @@ def _look_at_order(path: Path, topic: str, stamps: NDArray[np.int64], notes: lis
 def _align(
     tables: Mapping[str, tuple[NDArray[np.int64], dict[str, Array]]], notes: list[str]
 ) -> tuple[Array, dict[str, dict[str, Array]]]:
-    """The ticks that every topic has, in order."""
-    first, *others = (times for times, _ in tables.values())
-    if (np.diff(first) > 0).all() and all(np.array_equal(first, times) for times in others):
+    """Return the ticks that all topics have in common, in order."""
+    first, *rest = (times for times, _ in tables.values())
+    # Nearly always all topics have the same ascending times, and nothing needs to be sorted.
+    if (np.diff(first) > 0).all() and all(np.array_equal(first, times) for times in rest):
         return first * 1e-9, {topic: dict(values) for topic, (_, values) in tables.items()}
     common = np.unique(first)
-    for times in others:
+    for times in rest:
         common = np.intersect1d(common, times)
     columns: dict[str, dict[str, Array]] = {}
     for topic, (times, values) in tables.items():
@@ -461,7 +477,8 @@ def _align(
     return common * 1e-9, columns
 
 
-def _look_at_times(path: Path, time: Array, period: float, notes: list[str]) -> None:
+def _check_times(path: Path, time: Array, period: float, notes: list[str]) -> None:
+    """Note gaps in time. Raise RigtwinError if the period differs from the recorded one."""
     steps = np.diff(time)
     # Stamps may be rounded: their mean says more than any of them, gaps apart.
     typical = float(np.median(steps)) if len(steps) else period

@@ -1,5 +1,7 @@
-"""The records of an MCAP file, whatever of it is whole: damage costs the chunk that it hits and not
-what comes after it; and metadata that say of themselves whether they are as written."""
+"""Records of an MCAP file, as far as they are intact.
+
+Damage costs the chunk it hits, but not what follows. Metadata carry a checksum of themselves.
+"""
 
 from __future__ import annotations
 
@@ -32,26 +34,27 @@ DAMAGE = (
     ValueError,
     MemoryError,
 )
-"""What the mcap package raises on a file that ends or breaks in the middle."""
+"""Errors of the mcap package for a file that ends or is corrupt in the middle."""
 _COMPRESSION = b"\x04\x00\x00\x00zstd"
-"""How a chunk names its compression, and where that stands in it."""
+"""Name of the compression as it stands in a chunk."""
 _PLACE = 37
+"""Offset of that name from the chunk's beginning: opcode, lengths, times and checksum."""
 CHUNK_HEAD = _PLACE + len(_COMPRESSION)
 """Bytes by which the beginning of a chunk is known."""
 FEW = 8
-"""Turns of the same channels below which it is not worth while to take them at once."""
+"""Number of repetitions of a channel pattern below which vectorised reading does not pay."""
 _KNOWN, PRIVATE = frozenset(int(opcode) for opcode in Opcode), 0x80
 """Kinds of record of the format, and the first of those that programs may define."""
 _PREFIX = struct.Struct("<BQ")
 _MESSAGE = struct.Struct("<HIQQ")
-"""Of a record: its kind and length; of a message: its channel, number and two times."""
+"""Layouts of a record's opcode and length, and of a message's channel, number and two times."""
 _CHECKSUM = "crc32"
-"""Key of metadata that holds the checksum of the others."""
+"""Key of the metadata entry that holds the checksum of all other entries."""
 
 
 @dataclass(frozen=True)
 class Messages:
-    """Some consecutive messages of one channel. times: ns; data: what each holds."""
+    """Consecutive messages of one channel, with their times in ns and their contents."""
 
     channel_id: int
     times: list[int]
@@ -60,15 +63,18 @@ class Messages:
 
 @dataclass(frozen=True)
 class Lost:
-    """Something that cannot be read. first, last: s, of a chunk; None of anything else."""
+    """Part of a file that cannot be read. A lost chunk has the times of its messages, in s."""
 
     first: float | None = None
     last: float | None = None
 
 
 class _Reader(StreamReader):
-    """Without what a file has to find single messages by: nobody here looks for them, and it is
-    read number by number, which takes longer than all that is looked for."""
+    """Reader that skips message indexes.
+
+    They locate single messages, which is not needed here, and the mcap package parses them number
+    by number, which takes longer than everything else.
+    """
 
     def _read_record(self, opcode: int, length: int) -> McapRecord | None:
         if opcode == Opcode.MESSAGE_INDEX:
@@ -96,23 +102,24 @@ def length_of(chunk: Chunk) -> int:
 
 
 def read_records(file: BinaryIO) -> Iterator[McapRecord | Messages | Lost]:
-    """Everything that can be read of a file, in order, chunks taken apart.
+    """Yield everything that can be read of a file in order, with chunks taken apart.
 
     Parameters
     ----------
     file
-        Open at its beginning, and seekable.
+        Seekable file at its beginning.
 
     Yields
     ------
     McapRecord, Messages or Lost
-        The records, and where some are missing. A record may come twice around a damaged place.
+        Records, and marks where records are missing. A record may come twice near a damage.
 
     Raises
     ------
     InvalidMagic, struct.error
-        If it does not begin as an MCAP file does.
+        If the file does not begin as an MCAP file.
     """
+    # A corrupt length must not make the reader allocate more than the file holds.
     size = os.fstat(file.fileno()).st_size
     reader = _Reader(file, emit_chunks=True, validate_crcs=True, record_size_limit=size)
     known, resumed, begun = 0, -1, False
@@ -131,32 +138,35 @@ def read_records(file: BinaryIO) -> Iterator[McapRecord | Messages | Lost]:
                 known = file.tell()
                 yield from parts
             return
+        # Reading continues at the next chunk, since chunks are self-contained.
         except DAMAGE as error:
+            # The first record fails: this is no MCAP file, rather than a damaged one.
             if not begun and isinstance(error, InvalidMagic | struct.error):
                 raise
             yield Lost()
-            found = _find_chunk(file, max(known, resumed + 1))
-            if found is None:
+            chunk = _find_chunk(file, max(known, resumed + 1))
+            if chunk is None:
                 return
-            resumed = found
-            file.seek(found)
+            resumed = chunk
+            file.seek(chunk)
             reader = _Reader(file, skip_magic=True, emit_chunks=True, record_size_limit=size)
 
 
 def take_apart(chunk: Chunk) -> list[McapRecord | Messages]:
-    """The records in a chunk, as `mcap.stream_reader.breakup_chunk` has them, which reads a message
-    field by field. Nearly all records are messages, and nearly all of these repeat the same few
-    channels and sizes in turn: those are taken at once, a channel after the other.
+    """Return the records in a chunk.
+
+    The mcap package's `breakup_chunk` reads messages field by field. Here the messages that repeat
+    a pattern of channels and sizes, which are nearly all, are read at once, channel by channel.
 
     Parameters
     ----------
     chunk
-        Compressed as it stands in the file.
+        Chunk, compressed as in the file.
 
     Raises
     ------
     McapError, CRCValidationError and what decompressors raise
-        If it is damaged.
+        If the chunk is damaged.
     """
     stream, length = get_chunk_data_stream(chunk, validate_crc=True)
     data = stream.read(length)
@@ -165,6 +175,7 @@ def take_apart(chunk: Chunk) -> list[McapRecord | Messages]:
     seen: dict[int, int] = {}
     passed, wait = 0, 0
     while at < length:
+        # Every record starts with its opcode and length, so unknown kinds can be skipped.
         opcode, size = _PREFIX.unpack_from(data, at)
         begin = at + _PREFIX.size
         at = begin + size
@@ -174,7 +185,7 @@ def take_apart(chunk: Chunk) -> list[McapRecord | Messages]:
             channel, number, logged, published = _MESSAGE.unpack_from(data, begin)
             first = begin - _PREFIX.size
             if channel in seen:
-                # A turn is over: as many like it as there are.
+                # The channel comes again: the pattern is complete, and may repeat from here on.
                 stride = first - seen[channel]
                 seen.clear()
                 passed += 1
@@ -184,7 +195,8 @@ def take_apart(chunk: Chunk) -> list[McapRecord | Messages]:
                         records += turns
                         at = first + len(turns[0].times) * sum(map(_length, turns))
                         continue
-                    # Numbers written out are of any length: looked for again, but ever less often.
+                    # JSON messages vary in length, so patterns are rare: the search backs off
+                    # exponentially.
                     passed, wait = 0, 2 * wait + 1
             seen[channel] = first
             content = data[begin + _MESSAGE.size : at]
@@ -197,19 +209,22 @@ def take_apart(chunk: Chunk) -> list[McapRecord | Messages]:
 
 
 def _length(messages: Messages) -> int:
-    """Bytes of one of them in the file."""
+    """Return the number of bytes of one message in the file."""
     return _PREFIX.size + _MESSAGE.size + len(messages.data[0])
 
 
 def _take_turns(data: bytes, first: int, stride: int) -> list[Messages]:
-    """Messages whose channels and sizes repeat every `stride` bytes from `first` on; none if they
-    do not do so at least FEW times."""
+    """Return messages whose channels and sizes repeat every `stride` bytes from `first` on.
+
+    The result is empty if the pattern repeats fewer than FEW times.
+    """
     count = (len(data) - first) // stride
     if count < FEW:
         return []
+    # One row per repetition, seen as bytes without a copy.
     table = np.frombuffer(data, np.uint8, count * stride, first).reshape(count, stride)
     places: list[tuple[int, int, int]] = []
-    alike = np.ones(count, dtype=bool)
+    regular = np.ones(count, dtype=bool)
     at = 0
     while at < stride:
         if at + _PREFIX.size + _MESSAGE.size > stride:
@@ -218,26 +233,26 @@ def _take_turns(data: bytes, first: int, stride: int) -> list[Messages]:
         if opcode != Opcode.MESSAGE or not _MESSAGE.size <= size <= stride - at - _PREFIX.size:
             return []
         channel = _MESSAGE.unpack_from(data, first + at + _PREFIX.size)[0]
-        # Opcode, length and channel stand in a row.
+        # Opcode, length and channel are contiguous, so one comparison checks all three.
         head = table[:, at : at + _PREFIX.size + 2]
         if not (head[:FEW] == head[0]).all():
             return []
-        alike &= (head == head[0]).all(axis=1)
+        regular &= (head == head[0]).all(axis=1)
         places.append((channel, at + _PREFIX.size, size))
         at += _PREFIX.size + size
-    count = int(np.argmin(alike)) if not alike.all() else count
-    found = []
+    count = int(np.argmin(regular)) if not regular.all() else count
+    messages = []
     for channel, begin, size in places:
         logged = np.ascontiguousarray(table[:count, begin + 6 : begin + 14]).view("<u8")
         content = table[:count, begin + _MESSAGE.size : begin + size].tobytes()
-        each = size - _MESSAGE.size
-        parts = [content[part : part + each] for part in range(0, count * each, each or 1)]
-        found.append(Messages(channel, logged[:, 0].tolist(), parts or [b""] * count))
-    return found
+        width = size - _MESSAGE.size
+        parts = [content[part : part + width] for part in range(0, count * width, width or 1)]
+        messages.append(Messages(channel, logged[:, 0].tolist(), parts or [b""] * count))
+    return messages
 
 
 def _find_chunk(file: BinaryIO, start: int) -> int | None:
-    """Where the next compressed chunk begins; None if there is none."""
+    """Return the offset of the next compressed chunk; None if there is none."""
     with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
         return find_chunk(data, start)
 
@@ -258,22 +273,24 @@ def find_chunk(data: bytearray | mmap.mmap, start: int) -> int | None:
         Place of its first byte; None if no chunk begins at or behind `start`.
     """
     at = data.find(_COMPRESSION, start + _PLACE)
+    # The text may also occur in data; a chunk has its opcode at the right distance.
     while at >= 0 and data[at - _PLACE] != Opcode.CHUNK:
         at = data.find(_COMPRESSION, at + 1)
     return at - _PLACE if at >= 0 else None
 
 
 def seal(values: Mapping[str, str]) -> dict[str, str]:
-    """Metadata with a checksum of themselves."""
+    """Return metadata with a checksum of themselves."""
     return {**values, _CHECKSUM: _checksum(values)}
 
 
 def unseal(values: Mapping[str, str]) -> tuple[dict[str, str], bool]:
-    """Metadata without their checksum, and whether they are as they were written, as far as that
-    was said."""
+    """Return metadata without their checksum, and whether it is right or absent."""
+    # The checksum covers all entries but itself.
     bare = {name: value for name, value in values.items() if name != _CHECKSUM}
     return bare, values.get(_CHECKSUM, _checksum(bare)) == _checksum(bare)
 
 
 def _checksum(values: Mapping[str, str]) -> str:
+    """Return the checksum of metadata, which does not depend on their order."""
     return f"{zlib.crc32(json.dumps(values, sort_keys=True).encode()):08x}"

@@ -1,6 +1,6 @@
-"""Protobuf message types of the topics, made from the channel table.
+"""Protobuf message types of the topics, derived from the channel table.
 
-All fields are doubles, so every message of a topic has the same length and whole blocks are
+All fields are doubles. Every message of a topic therefore has the same length, and whole blocks are
 encoded and decoded at once.
 """
 
@@ -20,66 +20,69 @@ from rigtwin.recording.channels import CHANNELS
 WRITTEN_FORMAT = "1"
 """Format number in the metadata of the recordings that this version reads and writes."""
 RECORD = "rigtwin"
-"""Name of the metadata record that says what the test was."""
+"""Name of the metadata record that describes the test."""
 TWIN_RECORD = "rigtwin.twin"
-"""Name of the metadata record that says how a twin made the recording."""
+"""Name of the metadata record that describes how a twin made the recording."""
 END_RECORD = "rigtwin.end"
-"""Name of the metadata record that says why the test ended."""
+"""Name of the metadata record with the reason for the end of the test."""
 TRANSITION_RECORD = "rigtwin.transition"
-"""Name of the metadata records that say when and why a session went from one state to the next,
-one for each."""
+"""Name of the metadata records with time and cause of a session's transitions, one for each."""
 CARD_RECORD = "rigtwin.card"
-"""Name of the metadata record that holds the channel table."""
+"""Name of the metadata record with the channel table."""
 LATENESS_RECORD = "rigtwin.lateness"
-"""Name of the metadata record that says how late the ticks of a loop in real time were."""
+"""Name of the metadata record with the lateness of a loop in real time."""
 
 NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
-"""Of a field, as protobuf takes it."""
+"""Pattern of a field's name in protobuf."""
 _DOUBLE_WIRE_TYPE = 1
 
 
 def type_name(topic: str) -> str:
-    """Full name of a topic's message type, e.g. `rigtwin.Command`."""
+    """Return the full name of a topic's message type, such as `rigtwin.Command`."""
     return "rigtwin." + topic.strip("/").capitalize()
 
 
 def check_names(topic: str, names: Sequence[str]) -> None:
-    """Raises RigtwinError for names that the fields of a topic cannot have together: a recording
-    with them could be written and not be read."""
+    """Raise RigtwinError for field names that a topic cannot have.
+
+    A recording with such names could be written, but not read.
+    """
     for name in names:
         if not NAME.fullmatch(name):
             raise RigtwinError(
                 f"{topic}.{name}: expected a name of letters without accents, digits and _"
             )
-    # Readers tell fields apart by their names in camel case too.
+    # protobuf's JSON mapping distinguishes fields by their names in camel case.
     seen: dict[str, str] = {}
     for name in names:
-        same = re.sub(r"_(.?)", lambda found: found.group(1).upper(), name)
-        if same in seen:
-            raise RigtwinError(f"{topic} cannot have both {seen[same]} and {name}; rename one")
-        seen[same] = name
+        camel = re.sub(r"_(.?)", lambda match: match.group(1).upper(), name)
+        if camel in seen:
+            raise RigtwinError(f"{topic} cannot have both {seen[camel]} and {name}; rename one")
+        seen[camel] = name
 
 
 def descriptor(topic: str, names: Sequence[str]) -> bytes:
-    """Describes a topic's message type as an MCAP schema holds it.
+    """Return a topic's message type in the form of an MCAP schema.
 
     Parameters
     ----------
     topic : str
-        Its name, with the slash.
+        Name of the topic, with the slash.
     names : sequence of str
-        Of the fields, all of them doubles.
+        Names of the fields, all of them doubles.
 
     Returns
     -------
     bytes
-        A serialized FileDescriptorSet.
+        Serialised FileDescriptorSet.
     """
     file = descriptor_pb2.FileDescriptorProto(
         name=f"rigtwin/{topic.strip('/')}.proto", package="rigtwin", syntax="proto3"
     )
     message = file.message_type.add(name=type_name(topic).partition(".")[2])
     for number, name in enumerate(names, start=1):
+        # proto3 omits fields at their default; fixed layouts are possible because every field is
+        # written explicitly.
         message.field.add(
             name=name,
             number=number,
@@ -93,13 +96,15 @@ Bytes = NDArray[np.uint8]
 
 
 def _segments(count: int) -> Iterator[tuple[slice, np.dtype[np.void], Bytes]]:
-    """Fields 1 … count in runs whose tags are of equal length: which fields, the layout of one of
-    them, and their tags, shape (fields, length).
+    """Yield fields 1 … count in groups whose tags have equal length.
 
-    A tag is a varint: seven bits a byte, the lowest first, the highest bit set in all but the last.
+    A group is the slice of its fields, the layout of one field, and the tags, shape (fields,
+    length). A tag is a varint: seven bits per byte, the lowest first, and the highest bit set in
+    all bytes but the last.
     """
     first, length = 1, 1
     while first <= count:
+        # A tag of `length` bytes has 7·length bits, of which three are the wire type.
         last = min(count, (1 << (7 * length - 3)) - 1)
         numbers = (np.arange(first, last + 1) << 3) | _DOUBLE_WIRE_TYPE
         parts = numbers[:, None] >> (7 * np.arange(length)) & 0x7F
@@ -110,7 +115,7 @@ def _segments(count: int) -> Iterator[tuple[slice, np.dtype[np.void], Bytes]]:
 
 
 def encode_rows(values: Array) -> Bytes:
-    """Encode messages of doubles as protobuf does.
+    """Encode messages of doubles in protobuf's wire format.
 
     Parameters
     ----------
@@ -120,30 +125,31 @@ def encode_rows(values: Array) -> Bytes:
     Returns
     -------
     array
-        One message a row, shape (messages, bytes).
+        One message per row, shape (messages, bytes).
     """
     parts = [np.empty((len(values), 0), np.uint8)]
     for fields, layout, tags in _segments(values.shape[1]):
         part = np.empty((len(values), len(tags)), layout)
+        # Broadcasting repeats the constant tags in every message.
         part["tag"], part["value"] = tags, values[:, fields]
         parts.append(part.view(np.uint8).reshape(len(values), -1))
     return np.hstack(parts)
 
 
 def decode_rows(block: bytes, messages: int, count: int) -> Array | None:
-    """Decode messages that `encode_rows` made.
+    """Decode messages encoded by `encode_rows`.
 
     Parameters
     ----------
     block
         All messages, one after another.
     messages, count
-        Number of messages, and of fields in each.
+        Number of messages, and number of fields in each.
 
     Returns
     -------
     array or None
-        Shape (messages, fields); None if they are encoded in another way.
+        Values, shape (messages, fields); None if the messages have another encoding.
     """
     segments = list(_segments(count))
     width = sum(len(tags) * layout.itemsize for _, layout, tags in segments)
@@ -161,8 +167,10 @@ def decode_rows(block: bytes, messages: int, count: int) -> Array | None:
 
 
 def _decode_wrapped(block: bytes, messages: int, count: int) -> Array | None:
-    """Decode messages of 16 fields and more as earlier releases wrote them: the tags cut to a byte,
-    which no other reader understands."""
+    """Decode messages of 16 or more fields as earlier releases wrote them.
+
+    Those releases truncated tags to one byte, which no other reader understands.
+    """
     layout = np.dtype([("tag", "u1"), ("value", "<f8")])
     if len(block) != messages * count * layout.itemsize:
         return None
@@ -172,10 +180,10 @@ def _decode_wrapped(block: bytes, messages: int, count: int) -> Array | None:
 
 
 def list_topics() -> tuple[str, ...]:
-    """Topics of the channel table, in order."""
+    """Return the topics of the channel table in order."""
     return tuple(dict.fromkeys(channel.topic for channel in CHANNELS))
 
 
 def encode(values: Array) -> bytes:
-    """One message of a topic, of its fields' values."""
+    """Return one message with the fields' values, shape (fields,)."""
     return encode_rows(values[None, :]).tobytes()

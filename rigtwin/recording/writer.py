@@ -1,10 +1,8 @@
-"""Writes a recording block by block.
-
-What a block holds is on its way to the disk when `append` returns.
+"""Writer of recordings, block by block. A block is on its way to the disk when `append` returns.
 
 The mcap package's own writer takes one message at a time, which costs half as much as simulating
-the test. Here a block's messages are laid out at once by numpy; every record around them is the
-mcap package's.
+the test. Here numpy lays out a whole block of messages. All other records are encoded by the mcap
+package.
 """
 
 from __future__ import annotations
@@ -66,12 +64,13 @@ _MESSAGE = [
     ("publish_time", "<u8"),
 ]
 _RESERVE, _RESERVED = "rigtwin.reserve", 4096
-"""Name of the metadata record that keeps room, and its size in bytes."""
+"""Name of the metadata record that reserves space, and its size in bytes."""
 _PREFIX = 9
-"""Bytes of a record's opcode and length."""
+"""Number of bytes of a record's opcode and length."""
 
 
 def _encode(record: McapRecord) -> bytes:
+    """Return a record as bytes."""
     builder = RecordBuilder()
     record.write(builder)
     return builder.end()
@@ -84,7 +83,7 @@ def twin_values(
     version: str,
     effects_from: float = 0.0,
 ) -> dict[str, str]:
-    """What a recording keeps of a twin that makes it, as metadata TWIN_RECORD."""
+    """Return the metadata TWIN_RECORD, from which a twin's recording can be repeated."""
     return {
         "seed": str(seed),
         "parameters": json.dumps(parameters),
@@ -95,12 +94,11 @@ def twin_values(
 
 
 class Writer:
-    """A recording in the making.
+    """Recording that is being written.
 
-    Use as a context manager; leaving it finishes the file, also after an exception.
-
-    A process that dies without leaving it (kill -9, power) loses at most the block it was about to
-    append.
+    Use the writer as a context manager: leaving it finishes the file, also after an exception. A
+    process that dies without leaving it (kill -9, power failure) loses at most the block it was
+    about to append.
     """
 
     def __init__(
@@ -113,24 +111,25 @@ class Writer:
         fields: Mapping[str, Sequence[str]] | None = None,
         description: Path | None = None,
     ) -> None:
-        """Begin a recording.
+        """Create the file.
 
         Parameters
         ----------
         path
-            File of the recording.
+            Path of the file, which is replaced if it exists.
         experiment
-            Name of the test.
+            Name of the experiment.
         period
-            Period of the ticks, s.
+            Period of a tick, in s.
         controller
-            The operator's settings as `config.controller` holds them.
+            The operator's settings, as `config.controller` stores them.
         machine
             Name of the machine.
         fields
-            Topic → its fields. Defaults to the channel table.
+            Topic → field names. Defaults to those of the channel table.
         description
             Description of the machine, remembered in the file; None for a shipped one.
+
 
         Raises
         ------
@@ -157,6 +156,7 @@ class Writer:
         self._chunks: list[ChunkIndex] = []
         self._metadata: list[MetadataIndex] = []
         self._put(MCAP0_MAGIC + _encode(Header(profile="", library="rigtwin")))
+        # The controller's settings are what its operator knows; hidden effects are not stored here.
         config = json.dumps({"controller": controller})
         self.add_metadata(
             RECORD,
@@ -178,21 +178,21 @@ class Writer:
         version: str,
         effects_from: float = 0.0,
     ) -> None:
-        """Says how a twin makes this recording, so that it can be made again."""
+        """Add the metadata of a twin, from which the recording can be repeated."""
         values = twin_values(seed, parameters, effects, version, effects_from)
         self.add_metadata(TWIN_RECORD, values)
 
     def reserve(self) -> None:
-        """Keeps room in the file for what has to be said when the disk is full.
+        """Reserve space in the file for the last records on a full disk.
 
-        Metadata that still fits is put there.
+        Metadata that fit are then written there.
         """
         place = self._offset
         self.add_metadata(_RESERVE, {"": " " * _RESERVED})
         self._room = (place, self._offset)
 
     def add_metadata(self, name: str, values: Mapping[str, str]) -> None:
-        """Adds a metadata record now."""
+        """Add a metadata record now."""
         record = _encode(Metadata(name=name, metadata=seal(values)))
         if self._full:
             self._put_into_room(record)
@@ -201,15 +201,18 @@ class Writer:
         self._put(record)
 
     def append(self, **topics: Array | None) -> None:
-        """Adds consecutive ticks: topic name without its slash → values, shape (ticks, fields).
+        """Add consecutive ticks.
 
-        None is left out.
+        Parameters
+        ----------
+        topics
+            Topic name without its slash → values, shape (ticks, fields); None is left out.
         """
         ticks = next((len(values) for values in topics.values() if values is not None), 0)
         self.append_at(np.arange(self._next, self._next + ticks), topics)
 
     def append_at(self, sequence: NDArray[np.int64], topics: Mapping[str, Array | None]) -> None:
-        """Adds the ticks of these numbers, rising, shape (ticks,); the rest as `append`."""
+        """Add ticks with ascending numbers, shape (ticks,); see `append` for the values."""
         columns = {f"/{name}": values for name, values in topics.items() if values is not None}
         for topic in columns:
             if topic not in self._topics:
@@ -217,6 +220,7 @@ class Writer:
         ticks = len(sequence)
         if ticks == 0:
             return
+        # Numbers may leave gaps where ticks were missed.
         self._next = int(sequence[-1]) + 1
         self._ticks += ticks
         self._put_messages(
@@ -224,10 +228,17 @@ class Writer:
         )
 
     def append_beside(self, topic: str, values: Array, times: Array) -> None:
-        """Adds messages on a topic that has ticks of its own, such as those before the test begins.
+        """Add messages to a topic that has its own times, such as a session's before its test.
 
-        values: shape (messages, fields); times: s since the start of the test, rising, shape
-        (messages,); what was before it is put at its start.
+        Parameters
+        ----------
+        topic
+            Name of the topic.
+        values
+            Values, shape (messages, fields).
+        times
+            Ascending times since the start of the test in s, shape (messages,). Earlier times are
+            stored as the start, because times in a file are unsigned.
         """
         if topic not in self._topics:
             self._register(topic)
@@ -240,9 +251,12 @@ class Writer:
     def _put_messages(
         self, columns: Mapping[str, Array], times: NDArray[np.uint64], sequence: NDArray[np.int64]
     ) -> None:
+        # One structured array is the chunk's content byte for byte: the messages of a tick, topic
+        # by topic, then those of the next tick.
         ticks = len(times)
         for topic in columns:
             self._counts[topic] = self._counts.get(topic, 0) + ticks
+        # All messages of a topic have one length, so each topic is one rectangular array.
         encoded = {topic: encode_rows(values) for topic, values in columns.items()}
         layout = np.dtype(
             [
@@ -262,19 +276,19 @@ class Writer:
         self._put_chunk(messages, times)
 
     def finish(self, reason: str) -> None:
-        """Says why the test ended, writes the index, closes the file.
-
-        Does nothing the second time.
-        """
+        """Write the reason for the end and the index, and close the file. May be called twice."""
         if self._file.closed:
             return
+        # On a full disk the index is given up: readers can do without it.
         if self._full:
             self.add_metadata(END_RECORD, {"reason": reason, "ticks": str(self._ticks)})
             self._file.close()
             return
         self.add_metadata(END_RECORD, {"reason": reason, "ticks": str(self._ticks)})
+        # A checksum of 0 means none: each chunk has its own.
         self._put(_encode(DataEnd(data_section_crc=0)))
         start = self._offset
+        # The summary lets readers find channels and chunks without reading the whole file.
         summary = bytearray()
         offsets = bytearray()
         groups: list[tuple[Opcode, list[McapRecord]]] = [
@@ -299,7 +313,9 @@ class Writer:
         self._file.close()
 
     def _register(self, topic: str) -> None:
+        """Write schema and channel of a topic, before its first message."""
         number = len(self._topics) + 1
+        # The schema's number 0 means none, so numbers start at 1.
         self._topics[topic] = number
         names = self._fields.get(topic) or topic_fields(topic)
         assert names, f"no channels defined for {topic}"
@@ -314,7 +330,9 @@ class Writer:
         self._put(_encode(schema) + _encode(channel))
 
     def _put_chunk(self, messages: NDArray[np.void], times: NDArray[np.uint64]) -> None:
+        """Write a chunk, and the index of each of its topics."""
         content = messages.tobytes()
+        # The fastest level, because blocks are compressed while a test runs.
         packed = zstandard.ZstdCompressor(level=1).compress(content)
         start = self._offset
         chunk = _encode(
@@ -335,6 +353,7 @@ class Writer:
             places[number] = start + len(chunk) + len(index)
             pairs = np.empty((len(times), 2), "<u8")
             pairs[:, 0] = times
+            # A message's offset within the uncompressed chunk.
             pairs[:, 1] = place + messages.dtype.itemsize * np.arange(len(times))
             index += _message_index(number, pairs.tobytes())
         self._put(chunk + bytes(index))
@@ -368,7 +387,9 @@ class Writer:
         )
 
     def _put(self, data: bytes) -> None:
+        """Write bytes at the end of the file. Raise RigtwinError if the disk is full."""
         try:
+            # An unbuffered write may be partial without an error.
             written = self._file.write(data)
             if written != len(data):
                 raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
@@ -380,7 +401,7 @@ class Writer:
         self._offset += len(data)
 
     def _give_up(self) -> None:
-        """Nothing more can be added; what is whole stays."""
+        """Stop adding records; the file is cut to its last complete one."""
         if self._room is None:
             self._file.close()
             return
@@ -389,14 +410,16 @@ class Writer:
             self._file.truncate(self._offset)
 
     def _put_into_room(self, record: bytes) -> None:
-        """Writes over the room kept, which needs no space, and keeps the rest of it."""
+        """Overwrite the reserved space, which needs no free disk, and keep its remainder."""
         assert self._room is not None
         place, end = self._room
         rest = end - place - len(record) - len(_encode(Metadata(name=_RESERVE, metadata={"": ""})))
+        # The reserved space is used up; the record is lost, but the rig must still be stopped.
         if rest < 0:
             return
         filling = _encode(Metadata(name=_RESERVE, metadata={"": " " * rest}))
         with suppress(OSError):
+            # The end of the file is full, but its beginning can still be overwritten.
             self._file.seek(place)
             self._file.write(record + filling)
         self._room = (place + len(record), end)
@@ -409,6 +432,7 @@ class Writer:
 
 
 def _message_index(channel: int, pairs: bytes) -> bytes:
+    """Return the index of one channel's messages in a chunk: pairs of time and offset."""
     builder = RecordBuilder()
     builder.start_record(Opcode.MESSAGE_INDEX)
     builder.write2(channel)

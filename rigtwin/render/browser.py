@@ -1,4 +1,4 @@
-"""A page on paper or as a picture: what Chrome, Chromium or Edge makes of it without a window."""
+"""Printing of an HTML page to PDF or PNG by Chrome, Chromium or Edge without a window."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ import tempfile
 from pathlib import Path
 
 from rigtwin.errors import RigtwinError
-from rigtwin.files import write_whole
+from rigtwin.files import atomic_write
 from rigtwin.system import is_superuser
 
 VARIABLE = "RIGTWIN_BROWSER"
-"""Of the environment: the browser to use, where it is not found by its name."""
+"""Environment variable with the browser's path, if the browser is not found by its name."""
 NAMES = (
     "chromium",
     "chromium-browser",
@@ -31,15 +31,15 @@ PLACES = (
     r"C:\Program Files\Google\Chrome\Application\chrome.exe",
     r"C:\Program Files (x86)\Microsoft\Edge\Application\msedge.exe",
 )
-"""Where a browser lies that is not on the PATH."""
+"""Paths of browsers that are usually not on the PATH."""
 SETTLING = 10_000
-"""Of the page's own time, ms: until every figure is drawn."""
+"""Time in the page's virtual clock until every figure is drawn, in ms."""
 LONGEST = 120.0
-"""Of waiting for the browser, s."""
+"""Maximum time to wait for the browser, in s."""
 WIDTH, TALLEST = 1280, 16_384
-"""Of a picture, px. Browsers draw none that is higher."""
+"""Width and maximum height of a picture, in pixels. Browsers draw none that is higher."""
 A4 = 720
-"""Of the window whose page fits on A4, px: figures keep the width that they are drawn with."""
+"""Width of a window whose page fits on A4, in pixels. Figures keep their own width."""
 HEAD = """<style>@page { size: A4; }</style>
 <script>
 addEventListener('DOMContentLoaded', () => {
@@ -49,24 +49,25 @@ setInterval(() => {
   document.documentElement.dataset.height = document.documentElement.scrollHeight;
 }, 500);
 </script>"""
-"""The paper; on it nothing can be opened by a click; and how high the page is."""
+"""Additions to the page: the paper size, all folds opened, since paper cannot be clicked, and the
+page's height as an attribute."""
 
 
 def find_browser() -> str:
-    """The browser that prints.
+    """Return the path of the browser that prints.
 
     Raises
     ------
     RigtwinError
-        If there is none.
+        If no browser is found.
     """
     if chosen := os.environ.get(VARIABLE):
-        if found := shutil.which(chosen):
-            return found
+        if path := shutil.which(chosen):
+            return path
         raise RigtwinError(f"{VARIABLE} is {chosen!r}; expected the path of Chrome, Chromium, Edge")
-    for each in (*NAMES, *PLACES):
-        if found := shutil.which(each):
-            return found
+    for name in (*NAMES, *PLACES):
+        if path := shutil.which(name):
+            return path
     raise RigtwinError(
         "a PDF or PNG of a report is printed by Chrome, Chromium or Edge, and none was found; "
         f"install one, name it in {VARIABLE}, or write the report as .html"
@@ -74,14 +75,14 @@ def find_browser() -> str:
 
 
 def write_pdf(path: Path, page: str) -> None:
-    """Prints a page on A4.
+    """Print a page on A4.
 
     Parameters
     ----------
     path
-        Of the PDF.
+        Path of the PDF.
     page
-        Of HTML that needs nothing from elsewhere; what is folded is opened.
+        HTML that needs nothing from elsewhere. All folds are opened.
 
     Raises
     ------
@@ -96,42 +97,45 @@ def write_pdf(path: Path, page: str) -> None:
             "--no-pdf-header-footer",
             f"--print-to-pdf={made}",
         )
-        write_whole(path, _made(made))
+        atomic_write(path, _made(made))
 
 
 def write_png(path: Path, page: str) -> None:
-    """Takes a picture of a whole page, 1280 px wide, as `write_pdf`."""
+    """Write a picture of a whole page, 1280 pixels wide. Raise RigtwinError as `write_pdf`."""
     with _laid_out(path, page) as folder:
         made = Path(folder, "page.png")
+        # The height is unknown until the page is laid out, so the page is opened twice.
         drawn = _browse(Path(folder), f"--window-size={WIDTH},1000", "--dump-dom")
-        found = re.search(r'<html[^>]*data-height="(\d+)"', drawn)
-        if found is None:
+        height_match = re.search(r'<html[^>]*data-height="(\d+)"', drawn)
+        if height_match is None:
             raise RigtwinError("the browser did not say how high the page is")
-        height = min(int(found.group(1)), TALLEST)
+        height = min(int(height_match.group(1)), TALLEST)
         _browse(
             Path(folder),
             f"--window-size={WIDTH},{height}",
             "--hide-scrollbars",
             f"--screenshot={made}",
         )
-        write_whole(path, _made(made))
+        atomic_write(path, _made(made))
 
 
 def _laid_out(path: Path, page: str) -> tempfile.TemporaryDirectory[str]:
-    """A folder that holds the page. Beside the output: a browser in a container of its own, such as
-    Ubuntu's, sees the user's folders but not /tmp."""
+    """Return a temporary folder with the page, beside the output.
+
+    A browser in a sandbox, such as Ubuntu's snap, sees the user's folders but not /tmp.
+    """
     try:
         folder = tempfile.TemporaryDirectory(
             prefix="rigtwin-", dir=path.resolve().parent, ignore_cleanup_errors=True
         )
     except OSError as error:
         raise RigtwinError(f"cannot write {path}: {error.strerror}") from None
-    write_whole(Path(folder.name, "page.html"), page.replace("<head>", "<head>" + HEAD, 1))
+    atomic_write(Path(folder.name, "page.html"), page.replace("<head>", "<head>" + HEAD, 1))
     return folder
 
 
 def _browse(folder: Path, *options: str) -> str:
-    """Opens the page in the browser, and returns what that says."""
+    """Open the page in the browser, and return the browser's output."""
     command = [
         find_browser(),
         "--headless",
@@ -139,11 +143,12 @@ def _browse(folder: Path, *options: str) -> str:
         "--disable-background-networking",
         "--disable-component-update",
         "--no-first-run",
+        # A fresh profile keeps the user's browser, its windows and extensions out of it.
         f"--user-data-dir={folder / 'profile'}",
         f"--virtual-time-budget={SETTLING}",
     ]
     if is_superuser():
-        command.append("--no-sandbox")  # Chrome refuses root otherwise; the page is our own
+        command.append("--no-sandbox")  # Chrome refuses to run as root otherwise
     try:
         done = subprocess.run(
             [*command, *options, (folder / "page.html").as_uri()],
@@ -157,13 +162,14 @@ def _browse(folder: Path, *options: str) -> str:
     except OSError as error:
         raise RigtwinError(f"cannot start {command[0]}: {error.strerror}") from None
     if done.returncode:
+        # The last line of the error output is the most specific.
         last = (done.stderr.strip().splitlines() or ["without a word"])[-1]
         raise RigtwinError(f"{command[0]} failed to print the page: {last}")
     return done.stdout
 
 
 def _made(path: Path) -> bytes:
-    """What the browser wrote."""
+    """Return the file that the browser wrote."""
     try:
         return path.read_bytes()
     except OSError:

@@ -1,4 +1,4 @@
-"""Draws a recording: what moved, what pushed, and what the controller asked for."""
+"""Plots of a recording: motions, forces and commands over time."""
 
 from __future__ import annotations
 
@@ -13,22 +13,33 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from rigtwin.errors import RigtwinError
-from rigtwin.files import printable, write_whole
+from rigtwin.files import atomic_write, printable
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
 from rigtwin.render.style import COLOURS, STYLES, Style
 
 RIG_SENSORS = ("structure_lvdt", "load_cell")
-"""By which a quarter car's recording is known."""
+"""Sensors by which a recording of the suspension rig is recognised."""
 MOST_PANELS = 40
+"""Maximum number of panels; the title names how many were left out."""
 LARGEST = 1e100
-"""A picture's axis has no room for more."""
+"""Largest value of a signal that matplotlib's axes can scale."""
 KINDS = (".png", ".svg", ".pdf")
 
 
 @dataclass(frozen=True)
 class Trace:
-    """One line of a panel. needs: its channels; value: of them, in the panel's unit."""
+    """Line of a panel.
+
+    Attributes
+    ----------
+    label, colour
+        Legend and colour.
+    needs
+        Channels that the line needs.
+    value
+        Function of these channels that returns the line in the panel's unit.
+    """
 
     label: str
     colour: str
@@ -38,21 +49,24 @@ class Trace:
 
 @dataclass(frozen=True)
 class Panel:
-    """Lines that share an axis."""
+    """Panel: lines that share an axis."""
 
     title: str
     traces: tuple[Trace, ...]
 
 
 def _millimetres(position: Array) -> Array:
+    """Return a position in mm."""
     return 1e3 * position
 
 
 def _wheel(structure: Array, travel: Array) -> Array:
+    """Return the wheel's position in mm: plate minus travel."""
     return 1e3 * (structure - travel)
 
 
 def _plain(signal: Array) -> Array:
+    """Return a signal unchanged."""
     return signal
 
 
@@ -96,15 +110,16 @@ PANELS = (
     ),
     Panel("motor voltage, V", (Trace("commanded", ASKED, (("/command", "voltage"),), _plain),)),
 )
-"""What is drawn, from top to bottom; a panel without data is left out."""
+"""Panels of the suspension rig from top to bottom. Panels without data are left out."""
 
 
 def _plain_panels(recording: Recording) -> tuple[Panel, ...]:
-    """A panel for every channel name of another machine.
+    """Return a panel for every channel name of another machine.
 
-    What was commanded and what was sensed under one name together.
+    A command and a sensor of the same name share a panel.
     """
     names = dict.fromkeys(name for columns in recording.columns.values() for name in columns)
+    # The twin's true signals are left out: a rig does not have them.
     labels = {"/sensor": ("measured", SENSED), "/command": ("commanded", ASKED)}
     return tuple(
         Panel(
@@ -119,28 +134,29 @@ def _plain_panels(recording: Recording) -> tuple[Panel, ...]:
 
 
 def find_stretch(recording: Recording, start: float, until: float | None) -> slice:
-    """Finds the ticks of a stretch of time.
+    """Return the ticks of a stretch of time.
 
     Parameters
     ----------
     recording : Recording
-        Whose ticks.
+        Recording that contains the stretch.
     start, until : float
-        s; to the end where `until` is None.
+        Times in s. The stretch reaches to the end if `until` is None.
 
     Returns
     -------
     slice
-        Two ticks at least.
+        At least two ticks.
 
     Raises
     ------
     RigtwinError
-        If there are none.
+        If the stretch is empty or a time is not finite.
     """
     end = float(recording.time[-1]) if until is None else until
     if not (math.isfinite(start) and math.isfinite(end)):
         raise RigtwinError(f"--from {start:g} --until {end:g}: expected times in s")
+    # Half a period of tolerance includes a last tick that rounding has moved.
     first, last = np.searchsorted(recording.time, [start, end + recording.period / 2])
     if last - first < 2:
         span = f"{recording.time[0]:g} to {recording.time[-1]:.3f} s"
@@ -158,25 +174,25 @@ def draw(
     style: Style = STYLES["screen"],
     panels: Sequence[str] = (),
 ) -> None:
-    """Draws a recording: what moved, what pushed, what was commanded.
+    """Plot a recording of any machine into a file.
 
     Parameters
     ----------
     recording : Recording
-        Of any machine.
+        Recording of any machine.
     out : Path
-        A png, svg or pdf file.
+        Path of a png, svg or pdf file.
     start, until : float
-        s; to the end where `until` is None.
+        Times in s. The stretch reaches to the end if `until` is None.
     style : Style
-        How it looks.
+        Style of the figure.
     panels : sequence of str
-        What their titles begin with, in the order in which they are drawn; all by default.
+        Beginnings of the panels' titles, in the order to be drawn. Defaults to all panels.
 
     Raises
     ------
     RigtwinError
-        For another ending, an empty stretch, or a panel that it does not have.
+        If the file name has another ending, the stretch is empty, or a panel does not exist.
     """
     check_ending(out)
     ticks = find_stretch(recording, start, until)
@@ -185,13 +201,13 @@ def draw(
 
 
 def _panels(recording: Recording, wanted: Sequence[str]) -> list[tuple[str, list[Trace]]]:
-    """Titles and traces of the panels that it has data for."""
-    every = (
+    """Return titles and traces of the panels that the recording has data for."""
+    candidates = (
         PANELS
         if all(recording.has("/sensor", name) for name in RIG_SENSORS)
         else _plain_panels(recording)
     )
-    there = [
+    available = [
         (
             panel.title,
             [
@@ -200,30 +216,31 @@ def _panels(recording: Recording, wanted: Sequence[str]) -> list[tuple[str, list
                 if all(recording.has(*channel) for channel in trace.needs)
             ],
         )
-        for panel in every
+        for panel in candidates
     ]
-    there = [(title, traces) for title, traces in there if traces]
+    available = [(title, traces) for title, traces in available if traces]
     for name in wanted:
-        if not any(title.startswith(name) for title, _ in there):
-            titles = ", ".join(repr(title) for title, _ in there)
-            raise RigtwinError(f"{recording.path}: no panel {name!r}; there are {titles}")
+        if not any(title.startswith(name) for title, _ in available):
+            titles = ", ".join(repr(title) for title, _ in available)
+            raise RigtwinError(f"{recording.path}: no panel {name!r}; expected one of {titles}")
     if wanted:
-        there = [each for name in wanted for each in there if each[0].startswith(name)]
-    return there
+        available = [panel for name in wanted for panel in available if panel[0].startswith(name)]
+    return available
 
 
 def _figure(recording: Recording, ticks: slice, style: Style, panels: Sequence[str]) -> Figure:
-    time, there = recording.time[ticks], _panels(recording, panels)
-    left_out = f" · {MOST_PANELS} of {len(there)} channels" if len(there) > MOST_PANELS else ""
-    there = there[:MOST_PANELS]
+    time, shown = recording.time[ticks], _panels(recording, panels)
+    left_out = f" · {MOST_PANELS} of {len(shown)} channels" if len(shown) > MOST_PANELS else ""
+    shown = shown[:MOST_PANELS]
     figure = Figure(
-        figsize=(style.width, style.panel * len(there) + style.rest), layout="constrained"
+        figsize=(style.width, style.panel * len(shown) + style.rest), layout="constrained"
     )
     FigureCanvasAgg(figure)
-    axes = figure.subplots(len(there), 1, sharex=True, squeeze=False)[:, 0]
-    for axis, (title, traces) in zip(axes, there, strict=True):
+    axes = figure.subplots(len(shown), 1, sharex=True, squeeze=False)[:, 0]
+    for axis, (title, traces) in zip(axes, shown, strict=True):
         for trace in traces:
             signal = trace.value(*(recording.column(*channel)[ticks] for channel in trace.needs))
+            # NaN marks missing values; it is no reason to refuse a plot.
             if np.max(np.abs(signal), initial=0.0, where=~np.isnan(signal)) > LARGEST:
                 raise RigtwinError(
                     f"{recording.path}: {title} goes beyond {LARGEST:g}, which cannot be drawn"
@@ -246,31 +263,35 @@ def _figure(recording: Recording, ticks: slice, style: Style, panels: Sequence[s
             borderpad=0.1,
         )
         axis.margins(x=0)
+    # Titles of the panels share one vertical line whatever their numbers' width.
     figure.align_ylabels(axes)
     axes[-1].set_xlabel("time, s", fontsize=style.text)
     if not style.titled:
         return figure
     ending = f" · {recording.end}" if recording.end else ""
     about = f"{recording.path.name} · {recording.experiment}{ending}{left_out}"
+    # A file name in another encoding has characters that matplotlib cannot draw.
     about = printable(about.encode("utf-8", "replace").decode())
     figure.suptitle(about, fontsize=11, parse_math=False)
     return figure
 
 
 def _part(time: Array, signal: Array, period: float) -> tuple[Array, Array]:
-    """A signal without a line across what was not recorded."""
+    """Return a signal with NaN inserted at gaps, where no line must be drawn."""
+    # NaN interrupts a line in matplotlib.
     gaps = np.nonzero(np.diff(time) > 1.5 * period)[0] + 1
     return np.insert(time, gaps, np.nan), np.insert(signal, gaps, np.nan)
 
 
 def check_ending(out: Path) -> None:
-    """Raises RigtwinError unless a figure can be written to that name."""
+    """Raise RigtwinError unless the file name ends in a supported image format."""
     if out.suffix.lower() not in KINDS:
         raise RigtwinError(f"cannot draw {out.name!r}: the name must end in {', '.join(KINDS)}")
 
 
 def save(figure: Figure, out: Path, dpi: int = STYLES["screen"].dpi) -> None:
-    """Writes a figure. Raises RigtwinError if the file cannot be written."""
+    """Write a figure. Raise RigtwinError if the file cannot be written."""
+    # Drawn in memory first: a failure while drawing must not leave half a file.
     drawn = BytesIO()
     figure.savefig(drawn, dpi=dpi, format=out.suffix[1:].lower())
-    write_whole(out, drawn.getvalue())
+    atomic_write(out, drawn.getvalue())

@@ -1,4 +1,4 @@
-"""How figures look: on a screen, or in a paper with its columns and its type size."""
+"""Styles of figures, for a screen or for a paper with its column width and type size."""
 
 from __future__ import annotations
 
@@ -16,10 +16,25 @@ COLOURS = {"measured": "#2a6fa8", "commanded": "#d1603d", "other": "#6b7280"}
 
 @dataclass(frozen=True)
 class Style:
-    """A way to draw. width: of a figure, panel: height of a panel and rest: of what is not panel,
-    inches; text: points; line: of a trace, points; dashed: of what was commanded, a pattern that
-    tells it from what was measured without colour; titled: whether the figure says what it is of;
-    dpi: of pixels; settings: matplotlib's."""
+    """Style of a figure.
+
+    Attributes
+    ----------
+    width, panel, rest
+        Width of the figure, height of a panel, and height of everything else, in inches.
+    text
+        Type size in points.
+    line
+        Width of a trace in points.
+    dashed
+        Line pattern of commands, which distinguishes them from measurements without colour.
+    titled
+        Whether the figure has a title.
+    dpi
+        Resolution in pixels per inch.
+    settings
+        matplotlib's settings.
+    """
 
     width: float = 11.0
     panel: float = 1.9
@@ -33,14 +48,18 @@ class Style:
 
     @contextmanager
     def used(self) -> Iterator[None]:
-        """As what is drawn and saved meanwhile looks."""
+        """Apply the style to everything that is drawn and saved inside this context."""
+        # matplotlib's settings are global; the context restores them afterwards.
         with context(dict(self.settings)):
             yield
 
 
 def _paper(width: float) -> Style:
-    """Of a journal: sans serif text of 8 points, thin lines, type that stays type in vector files
-    (journals ask for embedded TrueType fonts), and no title, which is the caption's."""
+    """Return the style of a journal's figure of some width in inches.
+
+    It has sans-serif text of 8 points and thin lines. Vector files contain text as embedded
+    TrueType fonts, which journals require. The title is left to the caption.
+    """
     return Style(
         width=width,
         panel=1.15,
@@ -59,17 +78,18 @@ def _paper(width: float) -> Style:
             "ytick.labelsize": 7.0,
             "grid.linewidth": 0.4,
             "pdf.fonttype": 42,
+            # Text stays text in both vector formats.
             "svg.fonttype": "none",
         },
     )
 
 
 STYLES = {"screen": Style(), "paper": _paper(3.5), "paper-wide": _paper(7.16)}
-"""By name: 3.5 and 7.16 inches are one and two columns of an IEEE journal."""
+"""Styles by name. 3.5 and 7.16 inches are one and two columns of an IEEE journal."""
 
 
 def find_style(name: str) -> Style:
-    """The style of a name. Raises RigtwinError naming all there are."""
+    """Return a style by name. Raise RigtwinError, naming all styles, if it is unknown."""
     if name not in STYLES:
-        raise RigtwinError(f"unknown style {name!r}; there are {', '.join(STYLES)}")
+        raise RigtwinError(f"unknown style {name!r}; expected {', '.join(STYLES)}")
     return STYLES[name]

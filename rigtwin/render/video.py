@@ -1,6 +1,6 @@
-"""Films a recording offscreen.
+"""Video of a recording: the moving machine, with its signals and a time mark below it.
 
-The rig in motion, and its force and travel drawn beneath with a line that marks the time.
+Rendering is offscreen, so no display is needed.
 """
 
 from __future__ import annotations
@@ -33,10 +33,10 @@ Image = NDArray[np.uint8]
 FRAMES_PER_SECOND = 30
 WIDTH, SCENE_HEIGHT, TRACE_HEIGHT = 960, 432, 288
 BEAM_DRAWN = 0.13
-"""m; drawn length of a beam."""
+"""Length of a beam in the picture, in m."""
 BEAM_COLOUR = np.array([0.82, 0.38, 0.24, 1.0], np.float32)
 GHOST_COLOUR = np.array([0.92, 0.43, 0.08, 0.4], np.float32)
-"""Of what the twin predicts, as the page of a look has it."""
+"""Colour of the twin's prediction, the same as on the page of a look."""
 NO_RENDERING = (
     "cannot render without a display; on Debian or Ubuntu: "
     "sudo apt-get install libegl1 libgl1 libgl1-mesa-dri, "
@@ -56,72 +56,62 @@ def film(
     *,
     ghost: Mapping[str, Array] | None = None,
 ) -> None:
-    """Films a stretch of a recording in real time.
+    """Film a stretch of a recording in real time.
 
     Parameters
     ----------
     recording : Recording
-        Of any machine.
+        Recording of any machine.
     out : Path
-        An mp4 file.
+        Path of an mp4 file.
     machine : Machine
-        What is seen.
+        Machine to be shown.
     camera : str, optional
-        One of the model's, or free; its first by default.
+        Camera of the model, or `free`. Defaults to the model's first camera.
     start, until : float
-        s; to the end where `until` is None.
+        Times in s. The stretch reaches to the end if `until` is None.
     magnify : float
-        How many times as large motions are drawn, at most 20.
+        Magnification of motions, at most 20.
     progress : callable, optional
-        Called with frames done and frames in all.
+        Function called with the number of frames done, and of all frames.
     ghost : mapping, optional
-        Joint → position of a twin, m or rad, at every tick of the recording; drawn through the
-        machine.
+        Joint → position of a twin, in m or rad, at every tick of the recording. The twin is drawn
+        through the machine.
 
     Raises
     ------
     RigtwinError
-        If the file's ending, the camera, the stretch or this computer's rendering is at fault.
+        If the file's ending, the camera, the stretch or this computer's rendering is unsuitable.
     """
     if out.suffix.lower() != ".mp4":
         raise RigtwinError(f"cannot film {out.name!r}: the name must end in .mp4")
     if not 0.0 < magnify <= 20.0:
         raise RigtwinError(f"--magnify {magnify:g}: expected more than 0, at most 20")
-    motions = _motions(recording, machine)
-    for joint, values in motions.items():
-        if not np.isfinite(values).all():
-            raise RigtwinError(
-                f"{recording.path}: the position of {joint} has values that are no numbers; "
-                "nothing can be drawn of it"
-            )
     ticks = find_stretch(recording, start, until)
+    motions = {
+        name: magnify * values[ticks] for name, values in _motions(recording, machine).items()
+    }
     time = recording.time[ticks]
-    motions = {name: magnify * values[ticks] for name, values in motions.items()}
-    apart = {name: magnify * values[ticks] for name, values in (ghost or {}).items()}
+    ghosts = {name: magnify * values[ticks] for name, values in (ghost or {}).items()}
     traces = _Traces(machine.physics.curves(machine, recording), recording.time, ticks)
     beams = machine.physics.deflection(recording)
     bent = None if beams is None else magnify * beams[ticks]
+    # Frames have equal distances in time; each shows the next recorded tick.
     shown = np.searchsorted(time, np.arange(time[0], time[-1], 1.0 / FRAMES_PER_SECOND))
-    # Rounding may place the last of them behind the end.
+    # Rounding may place the last frame behind the end.
     frames = np.minimum(shown, len(time) - 1)
+    # The video grows under another name; a failure must not leave half a file.
     temporary = out.with_name(f".{os.getpid()}.{out.name[-100:]}.part")
     try:
         with (
             _renderer(machine, camera) as render,
             av.open(str(temporary), "w", format="mp4") as container,
         ):
-            stream = container.add_stream(
-                "libx264", rate=FRAMES_PER_SECOND, options={"crf": "20", "preset": "veryfast"}
-            )
-            stream.width, stream.height, stream.pix_fmt = (
-                WIDTH,
-                SCENE_HEIGHT + TRACE_HEIGHT,
-                "yuv420p",
-            )
+            stream = _add_stream(container)
             for number, tick in enumerate(frames):
                 at = {name: float(values[tick]) for name, values in motions.items()}
-                there = {name: float(values[tick]) for name, values in apart.items()}
-                scene = render(at, None if bent is None else bent[tick], there)
+                twin = {name: float(values[tick]) for name, values in ghosts.items()}
+                scene = render(at, None if bent is None else bent[tick], twin)
                 picture = np.vstack([scene, traces.at(float(time[tick]))])
                 container.mux(
                     stream.encode(
@@ -130,6 +120,7 @@ def film(
                 )
                 if progress is not None:
                     progress(number + 1, len(frames))
+            # Encoding nothing flushes the frames that the encoder has delayed.
             container.mux(stream.encode())
         temporary.replace(out)
     except OSError as error:
@@ -139,26 +130,43 @@ def film(
             temporary.unlink(missing_ok=True)
 
 
+def _add_stream(container: Any) -> Any:
+    """Add an H.264 stream to a video file; yuv420p is the format that every player shows."""
+    stream = container.add_stream(
+        "libx264", rate=FRAMES_PER_SECOND, options={"crf": "20", "preset": "veryfast"}
+    )
+    stream.width, stream.height = WIDTH, SCENE_HEIGHT + TRACE_HEIGHT
+    stream.pix_fmt = "yuv420p"
+    return stream
+
+
 def _motions(recording: Recording, machine: Machine) -> dict[str, Array]:
-    """Joint → position at every tick, m or rad, from what was recorded alone."""
+    """Return the position of each joint at every tick, in m or rad, from the recording alone."""
     machine.physics.require_motion(recording)
-    found = machine.physics.joint_positions(machine, recording.columns, recording.period)
-    if not found:
+    motions = machine.physics.joint_positions(machine, recording.columns, recording.period)
+    if not motions:
         raise RigtwinError(
-            f"{recording.path}: it says nothing of a joint's position; nothing can be drawn of it"
+            f"{recording.path}: no signal determines a joint's position; nothing can be drawn"
         )
-    return found
+    for joint, values in motions.items():
+        if not np.isfinite(values).all():
+            raise RigtwinError(
+                f"{recording.path}: the position of {joint} has values that are not finite; "
+                "nothing can be drawn of it"
+            )
+    return motions
 
 
 def _context() -> Any:
-    """An offscreen GL context.
+    """Return an offscreen GL context.
 
-    Of the kind MUJOCO_GL names, else EGL on Linux and the system's own elsewhere.
+    MUJOCO_GL selects its kind. The default is EGL on Linux, and the system's own elsewhere.
     """
     kind = os.environ.get("MUJOCO_GL", "").strip().lower() or RENDERER
     try:
         context = import_module(f"mujoco.{kind}").GLContext(WIDTH, SCENE_HEIGHT)
         context.make_current()
+    # MuJoCo's back ends raise errors of their own types.
     except Exception as error:  # each kind raises its own
         raise RigtwinError(f"{NO_RENDERING} ({kind}: {type(error).__name__})") from None
     return context
@@ -168,18 +176,23 @@ def _context() -> Any:
 def _renderer(
     machine: Machine, camera: str | None
 ) -> Iterator[Callable[[dict[str, float], Array | None, dict[str, float]], Image]]:
-    """A function from joint positions, the beams' heights if there are any, and the ghost's joint
-    positions if there is one, to a picture."""
+    """Provide a function that renders a picture.
+
+    Its arguments are the joints' positions, the beams' heights or None, and the ghost's joint
+    positions, which may be empty.
+    """
     model = mujoco.MjModel.from_xml_path(str(machine.physics.scene(machine)))
     cameras = [model.camera(number).name for number in range(model.ncam)]
     camera = camera or (cameras[0] if cameras else "free")
     if camera not in (*cameras, "free"):
-        raise RigtwinError(f"unknown camera {camera!r}; there are {', '.join([*cameras, 'free'])}")
+        raise RigtwinError(f"unknown camera {camera!r}; expected {', '.join([*cameras, 'free'])}")
+    # The context must be current before MuJoCo uploads its textures and meshes.
     data = mujoco.MjData(model)
     context = _context()
     model.vis.global_.offwidth, model.vis.global_.offheight = WIDTH, SCENE_HEIGHT
     drawing = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_150)
     mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, drawing)
+    # Room for the machine's geoms, a ghost, and the beams.
     scene = mujoco.MjvScene(model, maxgeom=500)
     options, view = mujoco.MjvOption(), mujoco.MjvCamera()
     if camera == "free":
@@ -192,6 +205,7 @@ def _renderer(
     def render(positions: dict[str, float], bent: Array | None, ghost: dict[str, float]) -> Image:
         for joint, position in positions.items():
             data.qpos[model.joint(joint).qposadr[0]] = position
+        # Kinematics alone: a picture needs poses, not forces.
         mujoco.mj_kinematics(model, data)
         mujoco.mj_camlight(model, data)
         mujoco.mjv_updateScene(model, data, options, None, view, mujoco.mjtCatBit.mjCAT_ALL, scene)
@@ -204,6 +218,7 @@ def _renderer(
             _draw_ghost(scene, model, data, options)
         mujoco.mjr_render(window, scene, drawing)
         mujoco.mjr_readPixels(picture, None, window, drawing)
+        # OpenGL's first row is the lowest.
         return picture[::-1]
 
     try:
@@ -216,20 +231,21 @@ def _renderer(
 def _draw_ghost(
     scene: mujoco.MjvScene, model: mujoco.MjModel, data: mujoco.MjData, options: mujoco.MjvOption
 ) -> None:
-    """Adds what moves once more to a scene, where a twin has it."""
+    """Add the twin's moving geoms to a scene, in the ghost's colour."""
     first = scene.ngeom
     moving = int(mujoco.mjtCatBit.mjCAT_DYNAMIC)
     mujoco.mjv_addGeoms(model, data, options, mujoco.MjvPerturb(), moving, scene)
     for number in range(first, scene.ngeom):
         geom = scene.geoms[number]
+        # Without the material its texture would hide the ghost's colour.
         geom.rgba, geom.matid, geom.transparent = GHOST_COLOUR, -1, 1
 
 
 def _draw_beams(scene: mujoco.MjvScene, plate: Array, bent: Array) -> None:
-    """Adds the cross of beams to a scene, its centre at the plate.
+    """Add the cross of beams to a scene, with its centre at the plate.
 
-    Its arms are drawn across the rig and far shorter than they are, what they do along it in full
-    size.
+    The arms are drawn across the rig and much shorter than they are; their deflection is drawn in
+    full size.
     """
     for arm in ((0.0, 1.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, -1.0)):
         points = [
@@ -245,16 +261,17 @@ def _draw_beams(scene: mujoco.MjvScene, plate: Array, bent: Array) -> None:
 
 
 class _Traces:
-    """Force and travel drawn once; every frame adds the line that marks its time."""
+    """Plots below the scene. They are drawn once; each frame adds only the time mark."""
 
     def __init__(self, curves: Sequence[Curve], time: Array, ticks: slice) -> None:
         time = time[ticks]
         figure = Figure(figsize=(WIDTH / 100, TRACE_HEIGHT / 100), dpi=100)
         canvas = FigureCanvasAgg(figure)
+        # Two axes fit below the scene; a machine with more channels shows the first ones.
         titles = list(dict.fromkeys(curve.axis for curve in curves))[:2]
         axes = figure.subplots(max(len(titles), 1), 1, sharex=True, squeeze=False)[:, 0]
         for axis, title in zip(axes, titles, strict=False):
-            for curve in (each for each in curves if each.axis == title):
+            for curve in (line for line in curves if line.axis == title):
                 axis.plot(
                     time, curve.values[ticks], color=curve.colour, linewidth=0.9, label=curve.label
                 )
@@ -273,14 +290,16 @@ class _Traces:
         canvas.draw()
         self._picture: Image = np.asarray(canvas.buffer_rgba())[..., :3].copy()
         box = lower.get_window_extent()
+        # Pixel rows count from the top in a picture, but from the bottom in matplotlib.
         top = upper.get_window_extent()
         self._rows = slice(TRACE_HEIGHT - int(top.y1), TRACE_HEIGHT - int(box.y0))
         self._left, self._width = box.x0, box.width
         self._start, self._span = float(time[0]), float(time[-1] - time[0])
 
     def at(self, time: float) -> Image:
-        """The traces with the marker at `time` (s)."""
+        """Return the plots with the mark at a time in s."""
         picture = self._picture.copy()
+        # The mark is two pixels wide, drawn into a copy of the finished picture.
         column = int(self._left + self._width * (time - self._start) / self._span)
         picture[self._rows, max(column - 1, 0) : column + 1] = (20, 20, 20)
         return picture

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from rigtwin.hardware.daq.signals import Signals
     from rigtwin.hardware.daq.table import ChannelTable
     from rigtwin.hardware.daq.wired import Wired
-    from rigtwin.hardware.session.own_controller import OwnController
+    from rigtwin.hardware.session.custom_controller import CustomController
     from rigtwin.hardware.session.test import AnyTest
     from rigtwin.models.model import Model
     from rigtwin.render.curves import Curve
@@ -187,14 +187,14 @@ class SuspensionRig(Physics):
         seed: int,
         table: ChannelTable,
         effects: Sequence[str],
-        own: OwnController | None,
+        controller: CustomController | None,
     ) -> AnyTest:
         from rigtwin.hardware.session.test import Test
 
         if machine.plant != RigPlant():
             raise RigtwinError(f"{machine.name}: sessions run the nominal suspension rig")
         demands = experiment.demands(configuration, seed)
-        return Test(experiment.name, configuration, demands, seed, table, effects, own)
+        return Test(experiment.name, configuration, demands, seed, table, effects, controller)
 
     def scene(self, machine: Machine) -> Path:
         from rigtwin.simulation.mechanics import SCENE

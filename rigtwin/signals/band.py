@@ -1,4 +1,4 @@
-"""Signals up to a frequency, without delay."""
+"""Band limitation of signals without delay."""
 
 from __future__ import annotations
 
@@ -7,31 +7,31 @@ import numpy as np
 from rigtwin.numerics.arrays import Array
 
 ORDER = 4
-"""Of the Butterworth filter that goes over a signal forth and back."""
+"""Order of the Butterworth filter, which is applied forwards and backwards."""
 WHOLE = 0.8
-"""Share of half the sampling frequency from which a band is the whole."""
+"""Share of the Nyquist frequency from which a band counts as unlimited."""
 
 
 def limit_band(signals: Array, band: float, period: float) -> Array:
-    """Signals up to a frequency.
+    """Return signals limited to a band.
 
     Parameters
     ----------
     signals
-        Shape (..., ticks).
+        Signals, shape (..., ticks).
     band
-        Hz, where half of the amplitude is left; infinite for all of it.
+        Frequency in Hz at which half of the amplitude remains; infinite for no limit.
     period
-        s, of a tick.
+        Period of a tick, in s.
 
     Returns
     -------
     array
-        Of the same shape.
+        Limited signals of the same shape.
     """
     if band * 2.0 * period > WHOLE:
         return signals
-    # Loading it takes a second, which most runs need not wait for.
+    # scipy.signal takes a second to load, which most commands need not wait for.
     from scipy.signal import butter, sosfiltfilt
 
     return np.asarray(

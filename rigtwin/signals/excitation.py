@@ -1,7 +1,4 @@
-"""What excites a test: pseudo-random roads and multisines.
-
-Sums of sines whose phases come from a seed.
-"""
+"""Excitation of tests: pseudo-random roads and multisines, with phases from a seed."""
 
 from __future__ import annotations
 
@@ -16,29 +13,30 @@ from rigtwin.numerics.arrays import Array
 from rigtwin.system import count_cores
 
 AT_ONCE = 8192
-"""Samples that stay in a core's cache."""
+"""Number of samples that fit into a core's cache."""
 FADE = 1.0
-"""Seconds over which an excitation grows from nothing, so that the rig starts at rest."""
+"""Time over which an excitation grows from zero, in s, so that the rig starts at rest."""
 
 
 def fade_in(time: Array, seconds: float = FADE) -> Array:
-    """Raised cosine from 0 at the start to 1 after `seconds`; its slope starts and ends at 0."""
+    """Return a raised cosine from 0 at the start to 1 after `seconds`, without jumps in slope."""
     return 0.5 - 0.5 * np.cos(np.pi * np.clip(time / seconds, 0.0, 1.0))
 
 
 def sum_of_sines(time: Array, frequencies: Array, amplitudes: Array, phases: Array) -> Array:
-    """Σ amplitude·sin(2π·frequency·time + phase); frequencies Hz, phases rad.
+    """Return Σ amplitude·sin(2π·frequency·time + phase).
 
-    Long ones are worked out on all cores; the numbers are the same on any.
+    Frequencies are in Hz, phases in rad. Long sums are computed on all cores. The result does not
+    depend on the number of cores, because each part is summed in the same order.
     """
     total = np.zeros_like(time)
     sines = list(zip(frequencies.tolist(), amplitudes.tolist(), phases.tolist(), strict=True))
 
     def add(first: int) -> None:
         part = slice(first, first + AT_ONCE)
-        here = time[part]
+        times = time[part]
         for frequency, amplitude, phase in sines:
-            total[part] += amplitude * np.sin(2 * math.pi * frequency * here + phase)
+            total[part] += amplitude * np.sin(2 * math.pi * frequency * times + phase)
 
     parts = range(0, len(time), AT_ONCE)
     if len(parts) == 1:
@@ -50,16 +48,20 @@ def sum_of_sines(time: Array, frequencies: Array, amplitudes: Array, phases: Arr
 
 
 def road_spectrum(road: Road) -> tuple[Array, Array]:
-    """Frequencies (Hz) and amplitudes (m) of the road's sines.
+    """Return frequencies, in Hz, and amplitudes, in m, of a road's sines.
 
-    Sqrt(2·S(f/v)·Δf/v), S(γ) = k/γⁿ (thesis Eq. 6.3).
+    The amplitudes are sqrt(2·S(f/v)·Δf/v) with the spectral density S(γ) = k/γⁿ (thesis Eq. 6.3).
 
-    Raises RigtwinError if the band is empty.
+    Raises
+    ------
+    RigtwinError
+        If the band is empty.
     """
     if road.highest < road.lowest:
         raise RigtwinError(
             f"road.highest = {road.highest:g} Hz is below road.lowest = {road.lowest:g} Hz"
         )
+    # The small term keeps the last frequency, which rounding might push beyond the band.
     count = int((road.highest - road.lowest) / road.spacing + 1e-9) + 1
     frequencies = road.lowest + road.spacing * np.arange(count)
     density = road.roughness / (frequencies / road.speed) ** road.exponent
@@ -67,10 +69,10 @@ def road_spectrum(road: Road) -> tuple[Array, Array]:
 
 
 def road_profile(road: Road, time: Array, random: np.random.Generator) -> Array:
-    """Ground position in m over `time` (s), with random phases.
+    """Return the ground position in m over `time` in s, with random phases.
 
-    Measured from where it starts, since the cylinder starts at its zero, and faded in over the
-    first second.
+    The position is relative to its start, because the cylinder starts at zero. It is faded in over
+    the first second.
     """
     frequencies, amplitudes = road_spectrum(road)
     phases = random.uniform(0.0, 2 * math.pi, len(frequencies))
@@ -87,35 +89,36 @@ def multisine(
     rms: float,
     random: np.random.Generator,
 ) -> Array:
-    """Makes a random-phase multisine, faded in over the first second.
+    """Return a random-phase multisine, faded in over the first second.
 
     Parameters
     ----------
     time : Array
-        s, shape (ticks,).
+        Times in s, shape (ticks,).
     lowest, highest, spacing : float
-        Of its frequencies, Hz.
+        Lowest and highest frequency and their spacing, in Hz.
     slope : float
-        Amplitudes fall with frequency^-slope.
+        Exponent of the spectrum: amplitudes fall with frequency^-slope.
     rms : float
-        Before the fading, in the unit that is wanted.
+        RMS before fading, in the unit of the result.
     random : Generator
-        Draws the phases.
+        Generator of the phases.
 
     Returns
     -------
     Array
-        Shape (ticks,).
+        Signal, shape (ticks,).
     """
     frequencies = np.arange(lowest, highest + spacing / 2, spacing)
     amplitudes = frequencies**-slope
+    # A sine of amplitude A has the mean square A²/2.
     amplitudes *= rms / math.sqrt(0.5 * np.sum(amplitudes**2))
     phases = random.uniform(0.0, 2 * math.pi, len(frequencies))
     return fade_in(time) * sum_of_sines(time, frequencies, amplitudes, phases)
 
 
 def schroeder(time: Array, frequencies: Array, amplitude: float) -> Array:
-    """Sines of equal amplitudes with Schroeder's phases −π·k·(k−1)/n (thesis §6.1.2)."""
+    """Return sines of equal amplitudes with Schroeder phases −π·k·(k−1)/n (thesis §6.1.2)."""
     number = np.arange(1, len(frequencies) + 1)
     phases = -math.pi * number * (number - 1) / len(frequencies)
     return sum_of_sines(time, frequencies, np.full(len(frequencies), amplitude), phases)

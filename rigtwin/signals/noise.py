@@ -1,7 +1,4 @@
-"""Noise estimated from the data.
-
-The white part of a signal, the mains line, and the motion beneath a noisy sensor.
-"""
+"""Noise estimated from data: the white part of a signal, the mains line, and the motion beneath."""
 
 from __future__ import annotations
 
@@ -13,30 +10,29 @@ import numpy as np
 from rigtwin.numerics.arrays import Array
 
 NORMAL_MEDIAN = 0.6744897501960817
-"""Median of the absolute value of a standard normal variable."""
+"""Median of the magnitude of a standard normal variable."""
 MAINS_SEARCH = 0.5
-"""Hz either side of the nominal mains frequency within which the line is looked for."""
+"""Distance from the nominal mains frequency within which the line is searched, in Hz."""
 STANDS_OUT = 1.5
-"""A residual's spectrum this many times the noise's is motion, not noise."""
+"""Ratio of a spectrum to the noise's from which it counts as motion."""
 PADDING = 1000
-"""Samples by which a signal is continued at both ends before it is filtered."""
+"""Number of samples by which a signal is extended at both ends before filtering."""
 REST, STILL = 0.1, 6.0
-"""s without motion, and the errors of a motion within which it is none."""
+"""Duration of a rest, in s, and the range of a motion, in its errors, that counts as rest."""
 HIGHEST_MOTION = 200.0
-"""Hz; no plate or carriage of such a rig moves measurably above."""
+"""Highest frequency of measurable motion, in Hz, of plates and carriages of such a rig."""
 
 
 SWITCHED = 4
-"""Values in all up to which a signal is switched, and its steps are no bits."""
+"""Number of different values up to which a signal counts as switched; its steps are no bits."""
 
 
 def white_noise(signal: Array) -> float:
-    """Standard deviation of a signal's white noise.
+    """Return the standard deviation of a signal's white noise.
 
-    From third differences, which leave nothing of smooth motion and 3 % of a 50 Hz line at 1 kHz,
-    and their median, which ignores the jumps of dry friction. Var(Δ³ noise) = 20 σ². Where coarse
-    bits make most of them zero, their rms is taken. A signal that is switched between few values
-    shows no noise at all.
+    Third differences remove smooth motion, and 97 % of a 50 Hz line at 1 kHz. Their median ignores
+    the jumps of dry friction. For white noise Var(Δ³) = (1 + 9 + 9 + 1) σ² = 20 σ². If coarse bits
+    make most differences zero, their RMS is used. A switched signal has no noise.
     """
     third = np.diff(signal, 3)
     if _is_switched(signal):
@@ -46,16 +42,16 @@ def white_noise(signal: Array) -> float:
 
 
 def _is_switched(signal: Array) -> bool:
-    """Whether a signal has few values in all, as that of a relay; a constant one is none."""
-    # The first samples of most signals show at once that they have more.
+    """Return whether a signal has only a few values, as a relay's; a constant signal does not."""
+    # The first samples of most signals show at once that there are more values.
     start = signal[: 64 * SWITCHED]
     return len(np.unique(start)) <= SWITCHED and 1 < len(np.unique(signal)) <= SWITCHED
 
 
 def smallest_step(signal: Array) -> float:
-    """The signal's bit.
+    """Return the step of one bit: the smallest difference of two values; 0 without a step.
 
-    The smallest difference of two of its values, rounding apart; 0 if it shows none.
+    Differences within rounding are ignored.
     """
     values = np.unique(signal)
     if len(values) <= SWITCHED:
@@ -65,34 +61,34 @@ def smallest_step(signal: Array) -> float:
     if not len(steps):
         return 0.0
     bit = float(np.min(steps))
-    # On a lattice every step is a whole number of bits.
+    # On a lattice every difference is a whole number of bits.
     share = np.abs(steps / bit - np.round(steps / bit))
     return bit if float(np.mean(share < 0.02)) > 0.9 else 0.0
 
 
 def rms(signal: Array) -> float:
-    """Root mean square, mean included."""
+    """Return the root mean square, mean included."""
     with np.errstate(over="ignore"):
         return float(np.sqrt(np.mean(signal**2)))
 
 
 def remove_mains(signal: Array, period: float, frequency: float) -> Array:
-    """Removes the mains line from a signal; its mean stays.
+    """Remove the mains line from a signal; the mean stays.
 
     Parameters
     ----------
     signal : Array
-        Shape (ticks,).
+        Signal, shape (ticks,).
     period : float
-        s.
+        Period of a tick, in s.
     frequency : float
-        Hz, nominal; the line is looked for within ±0.5 Hz of it.
+        Nominal mains frequency, in Hz. The line is searched within ±0.5 Hz.
 
     Returns
     -------
     Array
-        Shape (ticks,). The signal as it is where it was sampled too slowly to show the line: of 50
-        samples a second the line would be a constant.
+        Signal without the line, shape (ticks,). A signal sampled too slowly to show the line is
+        returned unchanged: at 50 samples a second the line is a constant.
     """
     if frequency + MAINS_SEARCH >= 0.5 / period:
         return signal.copy()
@@ -102,28 +98,32 @@ def remove_mains(signal: Array, period: float, frequency: float) -> Array:
     window = np.hanning(count)
     grid = np.fft.rfftfreq(count, period)
     near = np.abs(grid - frequency) <= MAINS_SEARCH
+    # Too short a signal cannot resolve the line's frequency: the nominal one is used.
     if near.sum() < 3:
         return _remove_line(signal, centred, window, time, frequency)
     peak = grid[near][np.argmax(np.abs(np.fft.rfft(window * centred))[near])]
     width = grid[1]
 
+    # The line is narrower than the grid: the windowed transform is maximised between its points.
     def power(candidate: float) -> float:
         return -abs(np.sum(window * centred * np.exp(-2j * math.pi * candidate * time)))
 
-    from scipy.optimize import minimize_scalar  # Late: so are scipy.signal and scipy.ndimage below.
+    # scipy's modules are imported where they are needed, because they take long to load.
+    from scipy.optimize import minimize_scalar
 
-    found = minimize_scalar(
+    line = minimize_scalar(
         power,
         bounds=(peak - width, peak + width),
         method="bounded",
         options={"xatol": width * 1e-3},
     )
-    return _remove_line(signal, centred, window, time, float(found.x))
+    return _remove_line(signal, centred, window, time, float(line.x))
 
 
 def _remove_line(
     signal: Array, centred: Array, window: Array, time: Array, frequency: float
 ) -> Array:
+    # Least squares with a window, so that motion at the signal's ends does not leak into the line.
     basis = np.column_stack(
         [np.cos(2 * math.pi * frequency * time), np.sin(2 * math.pi * frequency * time)]
     )
@@ -132,17 +132,17 @@ def _remove_line(
 
 
 def spectrum(signal: Array, period: float) -> tuple[Array, Array]:
-    """One-sided power spectral density, mean included: frequencies in Hz, density in unit²/Hz."""
-    # Loading it takes half a second, which most commands need not wait for.
+    """Return the one-sided power spectral density: frequencies in Hz, density in unit²/Hz."""
+    # scipy.signal takes half a second to load, which most commands need not wait for.
     from scipy.signal import welch
 
     return welch(signal, 1.0 / period, nperseg=min(4096, len(signal)), detrend=False)  # type: ignore[arg-type]
 
 
 def band(signal: Array, period: float) -> tuple[float, float]:
-    """The band in Hz that holds the middle 80 % of the signal's power, mean included.
+    """Return the band in Hz with the middle 80 % of the signal's power, mean included.
 
-    (0, 0) for no signal.
+    (0, 0) for a signal that is zero.
     """
     frequencies, density = spectrum(signal, period)
     if not density.any():
@@ -154,16 +154,16 @@ def band(signal: Array, period: float) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class EstimatedMotion:
-    """A motion estimated beneath a noisy measurement.
+    """Motion estimated beneath a noisy measurement.
 
     Parameters
     ----------
     position : Array
-        Shape (ticks,).
+        Estimated motion, shape (ticks,).
     correction : Array
-        What of it is not as expected, shape (ticks,).
+        Deviation of the motion from the expectation, shape (ticks,).
     velocity_error : float
-        Standard deviation of its rate of change, unit/s.
+        Standard deviation of the error of its rate of change, in unit/s.
     """
 
     position: Array
@@ -174,98 +174,100 @@ class EstimatedMotion:
 def estimate_motion(
     measured: Array, expected: Array, period: float, mains: float
 ) -> EstimatedMotion:
-    """Estimates the motion beneath a noisy measurement, given what a model expects of it.
+    """Estimate the motion beneath a noisy measurement, given a model's expectation.
 
-    Where measured − expected is noise, the expectation is the better estimate of the motion, plus
-    a constant offset. What stands out of the noise is kept by a Wiener filter, 1 − noise/spectrum
-    at every frequency: of all linear estimates the one with the least error, in position and in
-    velocity.
+    Where measured − expected is noise, the expectation plus a constant offset is the better
+    estimate. What exceeds the noise passes a Wiener filter with the gain 1 − noise/spectrum, the
+    linear filter with the smallest error in position and in velocity.
 
     Parameters
     ----------
     measured, expected : Array
-        Shape (ticks,).
+        Measurement and expectation, shape (ticks,).
     period : float
-        s.
+        Period of a tick, in s.
     mains : float
-        Nominal mains frequency, Hz.
+        Nominal mains frequency, in Hz.
 
     Returns
     -------
     EstimatedMotion
-        In the unit of the measurement.
+        Estimate in the unit of the measurement.
     """
     difference = remove_mains(measured - expected, period, mains)
     offset = float(np.mean(difference))
     padding = min(PADDING, len(difference) - 1)
+    # Point reflection at both ends continues value and slope.
     start, end = (
         2 * difference[0] - difference[padding:0:-1],
         2 * difference[-1] - difference[-2 : -2 - padding : -1],
     )
     extended = np.concatenate([start, difference, end]) - offset
     frequencies, density = spectrum(difference - offset, period)
+    # One-sided density of white noise: 2 σ² Δt.
     noise = 2 * white_noise(measured) ** 2 * period
     gain = wiener_gain(frequencies, density, noise)
-    # The error of a Wiener filter has the density noise·gain; it is differentiated here.
+    # A Wiener filter's error has the density noise·gain; (2πf)² differentiates it.
     error = math.sqrt(
         np.sum((2 * math.pi * frequencies) ** 2 * noise * gain) * float(frequencies[1])
     )
     grid = np.fft.rfftfreq(len(extended), period)
-    kept = np.fft.irfft(np.fft.rfft(extended) * np.interp(grid, frequencies, gain), len(extended))
-    correction = offset + kept[padding : padding + len(difference)]
+    filtered = np.fft.irfft(
+        np.fft.rfft(extended) * np.interp(grid, frequencies, gain), len(extended)
+    )
+    correction = offset + filtered[padding : padding + len(difference)]
     return EstimatedMotion(expected + correction, correction, error)
 
 
 def smooth(signal: Array, period: float) -> tuple[Array, float]:
-    """Smooths a measured motion: what is not to be told from its white noise is left out.
+    """Smooth a measured motion: parts that cannot be told from white noise are removed.
 
-    Where it stays within the error that is left it is taken to rest.
-
+    Where the motion stays within the remaining error, it is taken as rest.
     Parameters
     ----------
     signal : Array
-        Shape (ticks,).
+        Signal, shape (ticks,).
     period : float
-        s.
+        Period of a tick, in s.
 
     Returns
     -------
     tuple of Array and float
-        The motion, shape (ticks,), and the standard deviation of its error.
+        Motion, shape (ticks,), and the standard deviation of its error.
     """
     noise = white_noise(signal)
     count = len(signal)
     line = signal[0] + (signal[-1] - signal[0]) * np.arange(count) / max(count - 1, 1)
     swing = signal - line
-    # Mirrored, so that it goes on as smoothly as it can at both ends.
+    # Odd reflection about the line makes the signal periodic without a jump in value or slope.
     extended = np.concatenate([swing, -swing[-2:0:-1]])
     frequencies, density = spectrum(extended, period)
     gain = wiener_gain(frequencies, density, 2 * noise**2 * period)
     grid = np.fft.rfftfreq(len(extended), period)
-    kept = (
+    smoothed = (
         line
         + np.fft.irfft(np.fft.rfft(extended) * np.interp(grid, frequencies, gain), len(extended))[
             :count
         ]
     )
     error = noise * math.sqrt(float(np.mean(gain)))
-    return _straighten_rests(kept, error, max(3, round(REST / period))), error
+    return _straighten_rests(smoothed, error, max(3, round(REST / period))), error
 
 
 def motion_band(signal: Array, period: float) -> float:
-    """Find up to which frequency a measured motion stands out of its noise.
+    """Return the frequency up to which a measured motion exceeds its noise.
 
     Parameters
     ----------
     signal : Array
-        Shape (ticks,).
+        Signal, shape (ticks,).
     period : float
-        s.
+        Period of a tick, in s.
 
     Returns
     -------
     float
-        Hz, where `smooth` leaves half of the motion; infinite without noise.
+        Frequency in Hz at which `smooth` leaves half of the motion; infinite without noise.
     """
     noise = white_noise(signal)
     if noise == 0.0:
@@ -279,22 +281,22 @@ def motion_band(signal: Array, period: float) -> float:
 
 
 def _straighten_rests(motion: Array, error: float, window: int) -> Array:
-    """The motion with stretches in which it stays within its error straightened."""
+    """Return a motion in which stretches within the error are replaced by straight lines."""
     from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
     span = maximum_filter1d(motion, window) - minimum_filter1d(motion, window)
     still = np.diff(np.concatenate([[0], (span < STILL * error).astype(np.int8), [0]]))
-    found = motion.copy()
+    straight = motion.copy()
     for start, end in zip(np.nonzero(still == 1)[0], np.nonzero(still == -1)[0], strict=True):
-        found[start:end] = np.linspace(motion[start], motion[end - 1], end - start)
-    return found
+        straight[start:end] = np.linspace(motion[start], motion[end - 1], end - start)
+    return straight
 
 
 def wiener_gain(frequencies: Array, density: Array, noise: float) -> Array:
-    """Gives the gain of a Wiener filter: 1 − noise/density where there is motion, 0 above.
+    """Return the gain of a Wiener filter: 1 − noise/density up to a limit, and 0 above.
 
-    Motion goes up to the highest frequency at which the density, averaged over a fifth of an octave
-    or nine lines, stands out of the noise's density.
+    The limit is the highest frequency at which the density, averaged over a fifth of an octave or
+    nine lines, exceeds the noise's density.
     """
     smooth = np.empty_like(density)
     for line in range(len(density)):
@@ -305,5 +307,6 @@ def wiener_gain(frequencies: Array, density: Array, noise: float) -> Array:
         return np.zeros_like(density)
     highest = int(np.nonzero(stands_out)[0][-1])
     gain = np.clip(1.0 - noise / np.maximum(smooth, 1e-300), 0.0, 1.0)
+    # Above the limit single lines stand out by chance; they are noise.
     gain[highest + 1 :] = 0.0
     return gain

@@ -1,4 +1,4 @@
-"""Runs of equal samples, by which a dead or cut-off sensor is known."""
+"""Runs of equal samples, which reveal a dead or clipped sensor."""
 
 from __future__ import annotations
 
@@ -8,32 +8,32 @@ from rigtwin.numerics.arrays import Array
 from rigtwin.signals.noise import smallest_step, white_noise
 
 FLAT = 8
-"""Equal samples in a row at a signal's very end of range: it is cut off there."""
+"""Number of equal samples in a row at an end of a signal's range that count as clipped."""
 BEFORE, SLOWED = 9, 0.55
-"""Samples before such a stretch, and the share of their mean speed that the last ones have at
-least: a sine that is cut off for that long has 0.65, what comes to rest 0.45."""
+"""Number of samples before such a run, and the smallest share of their mean speed that the last of
+them may have. A sine clipped for that long has 0.65; a motion that comes to rest has 0.45."""
 STAIR, STAIRS = 3, 0.25
-"""Equal samples in a row beside a stretch, and their share of its length, with which the signal
-moves by stairs."""
+"""Number of equal samples in a row beside a run, and their share of the run's length, from which
+the signal counts as moving in stairs."""
 
 
 def longest_run(signal: Array, counted: Array | np.ndarray) -> tuple[int, int]:
-    """Finds the longest run of equal samples.
+    """Return the longest run of equal samples.
 
     Parameters
     ----------
     signal : Array
-        Shape (ticks,).
+        Signal, shape (ticks,).
     counted : Array
-        Which samples count, shape (ticks,).
+        Whether each sample counts, shape (ticks,).
 
     Returns
     -------
     tuple of int
-        Where it starts, and its length.
+        Start and length of the run.
     """
-    same = (np.diff(signal) == 0.0) & counted[1:] & counted[:-1]
-    edges = np.diff(np.concatenate([[0], same.astype(np.int8), [0]]))
+    equal = (np.diff(signal) == 0.0) & counted[1:] & counted[:-1]
+    edges = np.diff(np.concatenate([[0], equal.astype(np.int8), [0]]))
     starts, ends = np.nonzero(edges == 1)[0], np.nonzero(edges == -1)[0]
     if not len(starts):
         return 0, 1
@@ -42,38 +42,39 @@ def longest_run(signal: Array, counted: Array | np.ndarray) -> tuple[int, int]:
 
 
 def runs_at_ends(signal: Array) -> list[tuple[int, int]]:
-    """Finds where a signal runs into an end of its range and stays there.
+    """Return where a signal runs into an end of its range and stays there.
 
-    Zero is no end of a range: a motor that is switched off gives nothing for as long as it likes.
-    What comes to rest there by itself is none of it: it slows down before, or stands still at
-    other values beside it, as bits do.
+    Zero is no end of a range, because a motor that is switched off may stay there. Signals that
+    come to rest by themselves are left out: they slow down before, or repeat values beside the run,
+    as a signal with coarse bits does.
 
     Parameters
     ----------
     signal : Array
-        Shape (ticks,).
+        Signal, shape (ticks,).
 
     Returns
     -------
     list of (int, int)
-        Where each begins, and where the signal leaves it.
+        Start of each run, and the sample after its end.
     """
-    found = []
+    runs = []
     for extreme in (signal.max(), signal.min()):
         if extreme == 0.0:
             continue
         edges = np.diff(np.concatenate([[0], (signal == extreme).astype(np.int8), [0]]))
         starts, stops = np.nonzero(edges == 1)[0], np.nonzero(edges == -1)[0]
-        found += [
+        runs += [
             (int(start), int(stop))
             for start, stop in zip(starts, stops, strict=True)
             if stop - start >= FLAT and _is_run_into(signal, int(start), int(stop))
         ]
-    return found
+    return runs
 
 
 def _is_run_into(signal: Array, start: int, stop: int) -> bool:
-    """Whether what lies before and beside a stretch moves on as if it were not there."""
+    """Return whether the signal before and beside a run moves as if it went on beyond."""
+    # Too little lies before the run to tell how the signal reached it.
     if start < BEFORE:
         return False
     before = signal[start - BEFORE : start]
@@ -89,10 +90,10 @@ def _is_run_into(signal: Array, start: int, stop: int) -> bool:
 
 
 def find_cut_off(signal: Array) -> np.ndarray:
-    """Finds where a sensor is cut off at an end of its range, shape (ticks,)."""
-    found = np.zeros(len(signal), bool)
+    """Return where a sensor is clipped at an end of its range, shape (ticks,)."""
+    clipped = np.zeros(len(signal), bool)
     if white_noise(signal) >= smallest_step(signal):
-        # Bits coarser than the noise stand still at rest too.
+        # With bits coarser than the noise, equal samples mean nothing.
         for start, _ in runs_at_ends(signal):
-            found |= signal == signal[start]
-    return found
+            clipped |= signal == signal[start]
+    return clipped

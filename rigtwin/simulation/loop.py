@@ -31,7 +31,7 @@ from rigtwin.description.configuration import Configuration
 from rigtwin.description.control import set_up
 from rigtwin.description.settings import Safety
 from rigtwin.errors import RigtwinError
-from rigtwin.interruptions import deferred
+from rigtwin.interruptions import defer_sigint
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
 from rigtwin.simulation.converters import Sensing, sample_sensors
@@ -270,7 +270,7 @@ def run_compiled(
         asked = np.ascontiguousarray(demands[first : first + block], dtype=np.float64)
         commands, measured, truth = (np.empty((len(asked), 4)) for _ in range(3))
         # The first may have to be compiled, which can be interrupted.
-        with deferred() if first > 0 else nullcontext():
+        with defer_sigint() if first > 0 else nullcontext():
             done, number, column = _ticks(
                 plant=twin.simulation.state,
                 controlling=controlling,

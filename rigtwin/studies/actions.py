@@ -1,4 +1,4 @@
-"""What an agent does to the rig: it sets the controller that runs, or is the controller."""
+"""Actions of a learning agent: adjust the running controller, or replace it."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from rigtwin.numerics.arrays import Array
 
 
 class Actions(Protocol):
-    """What an agent does to the rig."""
+    """Interface between an agent's action and the rig's controller."""
 
     def spec(self, configuration: Configuration) -> specs.BoundedArray:
-        """Shape and bounds, in units."""
+        """Return the shape and the bounds of an action, in physical units."""
         ...
 
     def rest(self, configuration: Configuration) -> Array:
-        """The action that changes nothing."""
+        """Return the action that leaves the experiment unchanged."""
         ...
 
     def act(
@@ -34,26 +34,33 @@ class Actions(Protocol):
         demand: Demand,
         action: Array,
     ) -> tuple[State, Commands]:
-        """One tick under an action."""
+        """Advance the controller by one tick under an action.
+
+        Returns
+        -------
+        tuple of State and Commands
+            State of the controller after the tick, and the commands for the actuators.
+        """
         ...
 
 
 class Schedule:
-    """The agent changes settings of the controller that runs.
+    """Actions that set parameters of the running controller.
 
     Parameters
     ----------
     bounds
-        Setting → (low, high), in its unit.
+        Bounds (low, high) of each setting, in the setting's unit.
 
     Raises
     ------
     RigtwinError
-        For a setting that is none or no number, or bounds beyond its own.
+        If a name is not a numeric setting of the controller, or its bounds exceed the setting's.
     """
 
     def __init__(self, bounds: Mapping[str, tuple[float, float]]) -> None:
         self.bounds = dict(bounds)
+        # Bounds are checked against the units' ranges in the settings' annotations.
         known = fields(Settings)
         if not self.bounds:
             raise RigtwinError("actions: expected at least one setting with its bounds")
@@ -90,6 +97,7 @@ class Schedule:
         demand: Demand,
         action: Array,
     ) -> tuple[State, Commands]:
+        # The replacement lasts for one tick: the next action starts from the same settings.
         changed = dict(zip(self.bounds, action.tolist(), strict=True))
         return update(
             controlling._replace(settings=controlling.settings._replace(**changed)),
@@ -100,38 +108,43 @@ class Schedule:
 
 
 def suspension(settings: Settings) -> Schedule:
-    """The actions of a semi-active and an active suspension.
+    """Return the actions of a semi-active or active suspension.
 
     Parameters
     ----------
     settings
-        Of the controller that runs.
+        Settings of the running controller.
 
     Returns
     -------
     Schedule
-        The suspension's damping, Ns/m, from a fifth to ten times what it is, and its preload, N,
-        half as much more or less.
+        Bounds of the suspension's damping, in Ns/m, from 0.2 to 10 times its present value, and
+        of its preload, in N, from 0.5 to 1.5 times.
     """
+    # The upper bound of a setting's own range may be lower than the factor allows.
     factors = {"suspension_damping": (0.2, 10.0), "preload": (0.5, 1.5)}
     bounds = {}
     for name, (low, high) in factors.items():
-        there, meaning = getattr(settings, name), fields(Settings)[name]
+        present, meaning = getattr(settings, name), fields(Settings)[name]
         assert isinstance(meaning, Quantity)
-        bounds[name] = (low * there, min(high * there, meaning.high))
+        bounds[name] = (low * present, min(high * present, meaning.high))
     return Schedule(bounds)
 
 
 class Actuators:
-    """The agent is the controller: plate position, m, and motor voltage, V. The road stays the
-    experiment's."""
+    """Actions that replace the controller: plate position, in m, and motor voltage, in V.
+
+    The ground motion remains the experiment's.
+    """
 
     def spec(self, configuration: Configuration) -> specs.BoundedArray:
+        # The bounds are those of the safety limits, so that no action alone can trip the test.
         high = np.array([configuration.safety.structure, configuration.controller.voltage_limit])
         return specs.BoundedArray((2,), np.float64, -high, high, name="structure, voltage")
 
     def rest(self, configuration: Configuration) -> Array:
         settings = configuration.controller
+        # Steady state of the motor: force = constant * voltage.
         return np.array([settings.start, settings.preload / configuration.plant.motor.constant])
 
     def act(
@@ -142,8 +155,8 @@ class Actuators:
         demand: Demand,
         action: Array,
     ) -> tuple[State, Commands]:
-        # The controller runs beside, so that its filters show what they would; what it wants is not
-        # done.
+        # The controller is still updated, because its filters are part of the observation. Its
+        # commands are discarded.
         state, _ = update(controlling, state, measured, demand)
         structure, voltage = action.tolist()
         return state, Commands(demand.ground, structure, measured.load_cell, voltage)

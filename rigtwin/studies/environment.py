@@ -1,20 +1,20 @@
-"""The rig as a dm_env environment, for whatever learns: observations, actions and rewards in
-physical units.
+"""The rig as a dm_env environment for learning agents, in physical units.
 
-An episode is one test of an experiment; each takes the next seed, so another road and other noise.
-A trip of a safety limit ends it with discount 0 and a penalty, the test's end with discount 1. A
-schedule at `rest` is the experiment to the bit. `experiments.environment` makes one by name::
+An episode is one test of an experiment. Each episode uses the next seed, and with it a new road and
+new sensor noise. A tripped safety limit ends the episode with discount 0 and a penalty; the test's
+end has discount 1. A `Schedule` held at `rest` reproduces the experiment bit for bit.
+`experiments.environment` creates an environment by name::
 
     env = environment("active")    # the agent sets the suspension's damping and preload every 10 ms
-    env = environment("active", actions=Actuators(), interval=1)    # it is the controller
+    env = environment("active", actions=Actuators(), interval=1)    # the agent is the controller
 
-dm_control's viewer and its suite's wrappers take it too. To watch it, and to push the rig with the
-mouse::
+dm_control's viewer and the wrappers of its suite accept the environment. In the viewer the rig can
+be pushed with the mouse::
 
     from dm_control import viewer
     viewer.launch(env, policy=lambda step: env.rest())
 
-Pictures as observations, of the cameras `overview`, `side` and `wheel`; without a display set
+The cameras `overview`, `side` and `wheel` provide images as observations. Without a display, set
 MUJOCO_GL=egl::
 
     from dm_control.suite.wrappers import pixels
@@ -44,30 +44,30 @@ if TYPE_CHECKING:
     from dm_control.mujoco import Physics
 
 INTERVAL = 10
-"""Ticks that an action is held for: 10 ms."""
+"""Number of ticks an action is held: 10 ms."""
 OBSERVED = ("travel", "velocity", "force", "structure_position", "structure_velocity")
-"""Of the controller's state: filtered travel (m), its velocity (m/s), filtered force (N), structure
-model's position (m) and velocity (m/s)."""
+"""Observed states of the controller: filtered travel (m), its velocity (m/s), filtered force (N),
+position (m) and velocity (m/s) of the structure model."""
 TRIP_PENALTY = 1000.0
-"""Of a trip, in costs of a step."""
+"""Penalty of a trip, in units of the cost of one step."""
 ACTION_NOISE = 3
-"""Number of the random stream of noise on actions, beside the twin's own."""
+"""Index of the random stream for action noise, separate from the twin's streams."""
 
 
 class Reward(NamedTuple):
-    """Minus the mean over a step's ticks of (a/ride)² + (ΔF/road_holding)² + (Δs/travel)².
+    """Negative mean over a step's ticks of (a/ride)² + (ΔF/road_holding)² + (Δs/travel)².
 
-    Each figure is what costs 1, by default about what the passive car shows on the road of chapter
-    7; an infinite one does not count.
+    Each attribute is the value that costs 1. The defaults are about the values of the passive car
+    on the road of the thesis' chapter 7. An infinite value removes its term.
 
     Attributes
     ----------
     ride
-        Of the body's acceleration a, m/s².
+        Acceleration a of the body, in m/s².
     road_holding
-        Of the tyre's force off its static value ΔF, N.
+        Deviation ΔF of the tyre's force from its static value, in N.
     travel
-        Of the suspension's travel off its static value Δs, m.
+        Deviation Δs of the suspension's travel from its static value, in m.
     """
 
     ride: float = 0.25
@@ -76,13 +76,13 @@ class Reward(NamedTuple):
 
 
 class Task(NamedTuple):
-    """What dm_control's wrappers ask of a task.
+    """Interface that dm_control's wrappers expect of a task.
 
     Attributes
     ----------
     random
-        Where `dm_control.suite.wrappers.action_noise` draws from; begins anew with each episode,
-        from its seed.
+        Random numbers of `dm_control.suite.wrappers.action_noise`, seeded anew from the seed of
+        each episode.
     """
 
     random: np.random.Generator
@@ -93,38 +93,39 @@ def _task(seed: int) -> Task:
 
 
 class Environment(dm_env.Environment):
-    """One experiment as episodes.
+    """Episodes of one experiment.
 
-    An observation is a dictionary: `sensors`, the last raw samples, columns of
-    `controllers.Measurements`, m and N; `controller`, see `OBSERVED`; `commands`, the last, columns
-    of `controllers.Commands`, m, N and V.
+    An observation is a dictionary of three arrays: `sensors`, the latest raw samples in the order
+    of `controllers.Measurements`, in m and N; `controller`, the states listed in `OBSERVED`; and
+    `commands`, the latest commands in the order of `controllers.Commands`, in m, N and V.
 
     Parameters
     ----------
     configuration
-        The rig, its controller and the test.
+        Settings of the rig, its controller and the test.
     demands
-        Of (configuration, seed): what a test asks for, shape (ticks, 3), as an experiment has them.
+        Function of (configuration, seed) that returns the test's demands, shape (ticks, 3), as an
+        experiment has it.
     seed
-        Of the first episode.
+        Seed of the first episode.
     actions
-        What the agent does; by default the damping and preload of `suspension`.
+        Actions of the agent. Defaults to the damping and preload of `suspension`.
     reward
-        What a step costs.
+        Cost of a step.
     interval
-        Ticks that an action is held for.
+        Number of ticks an action is held.
 
     Attributes
     ----------
     trip : Trip
-        Why the last episode ended early.
+        Reason why the last episode ended early.
     task : Task
-        What dm_control's wrappers draw from.
+        Source of the random numbers of dm_control's wrappers.
 
     Raises
     ------
     RigtwinError
-        For a seed, an interval or a reward that makes no sense.
+        If the seed, the interval or a figure of the reward is out of range.
     """
 
     def __init__(
@@ -136,6 +137,7 @@ class Environment(dm_env.Environment):
         reward: Reward = Reward(),  # noqa: B008
         interval: int = INTERVAL,
     ) -> None:
+        # A bool is an int in Python; `seed=True` would otherwise pass as 1.
         whole = all(
             isinstance(number, int) and not isinstance(number, bool) for number in (seed, interval)
         )
@@ -144,11 +146,11 @@ class Environment(dm_env.Environment):
             and seed >= 0
             and interval >= 1
             and isinstance(reward, Reward)
-            and all(one > 0.0 for one in reward)
+            and all(figure > 0.0 for figure in reward)
         ):
-            given = f"seed {seed}, interval {interval}, {reward}"
+            values = f"seed {seed}, interval {interval}, {reward}"
             raise RigtwinError(
-                f"{given}: expected seed 0 or more, interval 1 or "
+                f"{values}: expected seed 0 or more, interval 1 or "
                 "more ticks, a Reward of figures above 0"
             )
         self.configuration, self.interval, self.reward = configuration, interval, reward
@@ -157,7 +159,9 @@ class Environment(dm_env.Environment):
         self.task = _task(seed)
         self._demands, self._next_seed = demands, seed
         self._controlling = set_up(configuration.controller, configuration.timing.period)
+        # The static force of the tyre is the body's weight; the reward counts deviations from it.
         self._static = configuration.controller.sprung_mass * configuration.controller.gravity
+        # Static deflection of the suspension spring under the body's weight.
         self._sag = (configuration.controller.preload - self._static) / max(
             configuration.controller.suspension_stiffness, 1e-9
         )
@@ -167,12 +171,16 @@ class Environment(dm_env.Environment):
 
     @property
     def physics(self) -> Physics:
-        """dm_control's view of the twin that runs, for its time, its joints and pictures of it.
+        """dm_control's view of the running twin: time, joints and camera images.
 
-        It looks at the twin's own model and data, so a force written to `data.xfrc_applied` acts on
-        the rig. Only the environment steps it. Each episode has its own, and frees the one before.
+        The view shares the twin's model and data, so a force written to `data.xfrc_applied` acts
+        on the rig. Only the environment may step it. Each episode creates a view and frees the
+        one of the episode before.
 
-        Raises RigtwinError where there is no dm_control, as on Python 3.13.
+        Raises
+        ------
+        RigtwinError
+            If dm_control is not installed, as on Python 3.13.
         """
         try:
             from dm_control.mujoco import Physics, wrapper  # loads OpenGL, which only pictures need
@@ -185,21 +193,21 @@ class Environment(dm_env.Environment):
         return self._physics
 
     def control_timestep(self) -> float:
-        """How long an action is held for.
+        """Return the time an action is held.
 
         Returns
         -------
         float
-            In s.
+            Time in s.
         """
         return self.interval * self.configuration.timing.period
 
     def action_spec(self) -> specs.BoundedArray:  # type: ignore[override]
-        """Shape and bounds of an action, in units."""
+        """Return the shape and the bounds of an action, in physical units."""
         return self.actions.spec(self.configuration)
 
     def observation_spec(self) -> dict[str, specs.Array]:  # type: ignore[override]
-        """Shapes of the parts of an observation, each named by its columns."""
+        """Return the shapes of the observation's arrays, each named by its columns."""
         return {
             "sensors": specs.Array((4,), np.float64, name=", ".join(Measurements._fields)),
             "controller": specs.Array((len(OBSERVED),), np.float64, name=", ".join(OBSERVED)),
@@ -207,23 +215,24 @@ class Environment(dm_env.Environment):
         }
 
     def rest(self) -> Array:
-        """The action that leaves the experiment as it is; of `Actuators`, the one that it starts
-        with.
+        """Return the action that leaves the experiment unchanged.
+
+        For `Actuators` this is the action that holds the rig at its start.
 
         Returns
         -------
         Array
-            As `action_spec` has it.
+            Action within `action_spec`.
         """
         return self.actions.rest(self.configuration)
 
     def reset(self) -> dm_env.TimeStep:
-        """Begins the next episode; its first observation is of the rig before the first tick.
+        """Begin the next episode. Its first observation shows the rig before the first tick.
 
         Returns
         -------
         dm_env.TimeStep
-            Of type FIRST.
+            First step of the episode, of type FIRST.
         """
         twin = (
             self._begin(self._next_seed)
@@ -234,6 +243,7 @@ class Environment(dm_env.Environment):
         self._state, self._memory = initial_state(self._controlling), empty_memory()
         self._tick, self._over, self.trip = 0, False, Trip.NONE
         start = self.configuration.controller.start
+        # Before the first tick nothing is measured; the observation shows the known start.
         self._measured = Measurements(
             float(self._asked[0, 0]), start, 0.0, self.configuration.controller.preload
         )
@@ -241,26 +251,28 @@ class Environment(dm_env.Environment):
         return dm_env.restart(self._observation(twin))
 
     def step(self, action: Array) -> dm_env.TimeStep:
-        """Holds an action for the interval; after an episode's end, begins the next.
+        """Hold an action for the interval. After the end of an episode, begin the next one.
 
         Parameters
         ----------
         action
-            As `action_spec` has it.
+            Action within `action_spec`.
 
         Returns
         -------
         dm_env.TimeStep
-            What the rig shows after the interval, and the reward of it.
+            Observation after the interval, and the reward of the interval.
 
         Raises
         ------
         ValueError
-            For an action out of its bounds.
+            If the action is out of bounds or not finite.
         """
         twin = self._twin
+        # dm_env's convention: a step after the last one begins a new episode.
         if self._over or twin is None:
             return self.reset()
+        # validate() checks shape, type and bounds, but lets NaN pass.
         action = np.asarray(self.action_spec().validate(np.asarray(action, dtype=np.float64)))
         if not np.all(np.isfinite(action)):
             raise ValueError(
@@ -268,7 +280,8 @@ class Environment(dm_env.Environment):
             )
         cost, first = 0.0, self._tick
         while self._tick < min(first + self.interval, len(self._asked)) and self.trip == Trip.NONE:
-            cost += self._ticked(twin, action)
+            cost += self._advance_tick(twin, action)
+        # An interval cut short by a trip or the test's end has fewer ticks.
         cost /= self._tick - first
         self._over = self.trip != Trip.NONE or self._tick == len(self._asked)
         if self.trip != Trip.NONE:
@@ -278,9 +291,10 @@ class Environment(dm_env.Environment):
         return dm_env.transition(-cost, self._observation(twin))
 
     def _begin(self, seed: int) -> Twin:
-        """Builds the rig of the episode of a seed, at its start."""
+        """Build the twin for the episode of one seed, and start it."""
         self.seed, self.task = seed, _task(seed)
         self._asked = self._demands(self.configuration, seed)
+        # The view refers to the memory of the old twin's MuJoCo data: free it before that goes.
         if self._physics is not None:
             self._physics.free()
             self._physics = None
@@ -288,10 +302,11 @@ class Environment(dm_env.Environment):
         self._twin.start()
         return self._twin
 
-    def _ticked(self, twin: Twin, action: Array) -> float:
-        """One tick, and its cost."""
+    def _advance_tick(self, twin: Twin, action: Array) -> float:
+        """Advance the rig by one tick, and return the cost of the tick."""
         period = self.configuration.timing.period
         measured, demand = twin.read(), Demand(*self._asked[self._tick].tolist())
+        # A missed tick, as on a busy computer: the card keeps the commands of the tick before.
         if twin.misses(1)[0]:
             commands = twin.held
         else:
@@ -300,6 +315,7 @@ class Environment(dm_env.Environment):
             )
         self._measured = measured
         self._tick += 1
+        # The same function judges limits on the twin, the virtual card and the rig.
         number, _ = judge_limits(
             self.configuration.safety, period, self._memory, measured, commands
         )
@@ -311,12 +327,15 @@ class Environment(dm_env.Environment):
     def _cost(self, true: Measurements) -> float:
         period = self.configuration.timing.period
         self._plate = [*self._plate[-2:], true.structure_lvdt]
+        # Second central difference of the plate's position: no acceleration is simulated for the
+        # plate, whose motion is prescribed.
         ride = (
             (self._plate[0] - 2.0 * self._plate[1] + self._plate[2]) / period**2
             if len(self._plate) == 3
             else 0.0
         )
         deflection = np.array([true.ground_lvdt - true.structure_lvdt + true.suspension_lvdt])
+        # The tyre's deflection is ground minus wheel, and the wheel stands at plate minus travel.
         tyre = (
             float(tyre_force(self.configuration.plant.tyre, deflection, np.zeros(1))[0])
             - self._static

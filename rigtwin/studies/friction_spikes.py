@@ -1,11 +1,11 @@
-"""Friction spikes in a recording, and the settings of the thesis' friction compensator found from
-them (§4.5).
+"""Settings of the thesis' friction compensator, identified from the friction spikes of a recording
+(§4.5).
 
-A recording without compensation holds what a person would read off its plots: how far the force
-jumps when the motor reverses, how the force error rises then, and how early the filtered velocity
-tells. The force error is split into what friction causes through the known force loop and the rest,
-so that the compensator can be tried on the recording with its steps closed through that loop; the
-settings are those that leave the least force error.
+A recording made without compensation shows how far the force jumps when the motor reverses, how the
+force error rises afterwards, and how early the filtered velocity indicates the reversal. The force
+error is split into the part that friction causes through the known force loop and the remainder.
+The compensator is then simulated on the recording, with its steps closed through that loop. The
+identified settings minimise the force error.
 """
 
 from __future__ import annotations
@@ -25,23 +25,25 @@ from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
 from rigtwin.recording import Recording
 
-APART = 0.05
-"""s; reversals nearer to each other than this are not used to measure the jump."""
-BESIDE = 0.02
-"""s before and after a reversal over which the friction is averaged."""
+SEPARATION = 0.05
+"""Minimum time between reversals that are used to measure the jump, in s."""
+WINDOW = 0.02
+"""Time before and after a reversal over which the friction is averaged, in s."""
 SMOOTHING = 0.008
-"""s; of the velocity that tells where the motor reverses, forwards and backwards, so without a
-lag."""
-FEWEST = 8
-"""Reversals needed."""
+"""Standard deviation of the Gaussian that smooths the travel before reversals are located, in s.
+The filter is symmetric in time, so it adds no lag."""
+MIN_REVERSALS = 8
+"""Minimum number of reversals."""
 LEAST_FRICTION, MOST_FRICTION = 0.5, 500.0
-"""N; a jump outside these is noise or a fault."""
-USED = (
+"""Range of a plausible Coulomb force, in N. A jump outside is noise or a fault."""
+REQUIRED = (
     ("/command", "force"),
     ("/command", "voltage"),
     ("/sensor", "suspension_lvdt"),
     ("/sensor", "load_cell"),
 )
+# Ranges that the search covers, each in the setting's unit. The upper bound of the integer setting
+# spike_samples lies just below 6, because its fraction is cut off.
 BOUNDS = {
     "spike_threshold": (1.0, 12.0),
     "spike_gradient": (50.0, 4000.0),
@@ -54,11 +56,25 @@ BOUNDS = {
 
 @dataclass(frozen=True)
 class Calibration:
-    """Settings found, and what the detector does with them on the recording.
+    """Identified settings, and the performance of the detector on the recording.
 
-    friction: Coulomb force of the motor, N; envelope: mean force error after a reversal, towards
-    the new direction, N, at every tick for BESIDE; delay: median time from reversal to detection,
-    s.
+    Attributes
+    ----------
+    settings
+        Identified settings of the controller.
+    friction
+        Coulomb force of the motor, in N.
+    envelope
+        Mean force error after a reversal, positive in the new direction, in N; one value per tick
+        for twice `WINDOW`.
+    reversals
+        Number of measured reversals.
+    detected
+        Number of reversals the compensator detected.
+    false
+        Number of steps without a reversal.
+    delay
+        Median time from reversal to detection, in s; NaN without detections.
     """
 
     settings: Settings
@@ -70,7 +86,7 @@ class Calibration:
     delay: float
 
     def toml(self) -> str:
-        """The settings as a TOML file's text, for `--config`."""
+        """Return the settings as TOML text, for the option `--config`."""
         names = ("friction_step", *BOUNDS)
         values = [f"{name} = {float(getattr(self.settings, name)):.6g}" for name in names]
         compensator = f'compensator = "{Compensator.TWO_STEP.label}"'
@@ -79,7 +95,7 @@ class Calibration:
 
 @kernel
 def _detect(settings: Settings, travels: Array, errors: Array, period: float, out: Array) -> None:
-    """Direction of the step that would be made at every tick, or 0, were none ever carried out."""
+    """Write the direction of the compensator's step at each tick, or 0, as if none were applied."""
     state, velocities, last = REST, NO_VELOCITIES, NO_ERRORS
     for tick in range(len(travels)):
         before = state.added
@@ -96,10 +112,18 @@ def _detect(settings: Settings, travels: Array, errors: Array, period: float, ou
 
 
 class _Test(NamedTuple):
-    """What the force loop meets, one a tick: travel m, force error not due to friction N, friction
-    N.
+    """Inputs of the force loop at each tick of a test.
 
-    period in s.
+    Attributes
+    ----------
+    travels
+        Measured travel, in m.
+    rest
+        Force error not due to friction, in N.
+    friction
+        Friction force, in N.
+    period
+        Duration of a tick, in s.
     """
 
     travels: Array
@@ -116,16 +140,29 @@ def _close_loop(
     errors: Array,
     steps: Array,
 ) -> float:
-    """The force loop under friction, with the compensator or without.
+    """Simulate the force loop under friction, with or without the compensator.
 
-    Gives back the mean square of the force error that friction leaves, N². errors: the part due to
-    friction, as filtered, and steps: direction of each step made; both are written.
+    The motor is a first-order lag, the controller proportional-integral on the filtered error.
+
+    Parameters
+    ----------
+    errors, steps
+        Outputs, one value per tick: the filtered force error due to friction, in N, and the
+        direction of each step.
+
+    Returns
+    -------
+    float
+        Mean square of the force error that friction causes, in N².
     """
     state, velocities, last = REST, NO_VELOCITIES, NO_ERRORS
     motor, integral, filtered, total = 0.0, 0.0, 0.0, 0.0
     period = test.period
+    # Exact discretisation of the first-order lag under a held command.
     stays = np.exp(-period / MOTOR_LAG)
     for tick in range(len(test.travels)):
+        # Load cell = motor force minus friction: the loop is linear, so the response to friction
+        # can be simulated alone and the measured remainder added where the compensator reads it.
         felt = motor - test.friction[tick]
         total += felt**2
         filtered = felt if tick == 0 else low_pass(filtered, felt, settings.filter_force, period)
@@ -143,14 +180,17 @@ def _close_loop(
             )
         steps[tick] = np.sign(state.added - before)
         integral -= settings.ki * filtered * period
-        told = integral - settings.kp * filtered + state.added
-        motor = stays * motor + (1.0 - stays) * told
+        command = integral - settings.kp * filtered + state.added
+        motor = stays * motor + (1.0 - stays) * command
     return total / len(test.travels)
 
 
 @kernel
 def filter_lag(samples: Array, time_constant: float, period: float) -> Array:
-    """Samples through the controller's first-order filter (s), which starts at the first."""
+    """Return the samples filtered by the controller's first-order low pass.
+
+    The filter starts at the first sample. The time constant and the period are in s.
+    """
     out = np.empty_like(samples)
     out[0] = samples[0]
     for tick in range(1, len(samples)):
@@ -165,9 +205,21 @@ def detections(
     cells: Array,
     period: float,
 ) -> Array:
-    """Direction of the step that the compensator would make at every tick of a test, or 0, were
-    none ever carried out. travels, cells: as measured, m and N; demanded: force, N; shape (ticks,)
-    each."""
+    """Return the direction of the compensator's step at each tick, or 0, as if none were applied.
+
+    Parameters
+    ----------
+    settings
+        Settings of the compensator.
+    travels
+        Measured travel, in m, shape (ticks,).
+    demanded
+        Demanded force, in N, shape (ticks,).
+    cells
+        Measured force, in N, shape (ticks,).
+    period
+        Duration of a tick, in s.
+    """
     out = np.empty(len(travels))
     errors = demanded - filter_lag(np.ascontiguousarray(cells), settings.filter_force, period)
     _detect(settings, np.ascontiguousarray(travels), errors, period, out)
@@ -175,99 +227,99 @@ def detections(
 
 
 def _without_hum(signal: Array, time: Array) -> Array:
+    """Return the signal without its component at mains frequency, fitted by least squares."""
+    # Sine and cosine at the nominal frequency: amplitude and phase follow from a linear fit.
     turn = 2 * np.pi * MAINS * time
     waves = np.column_stack([np.sin(turn), np.cos(turn)])
     return signal - waves @ np.linalg.lstsq(waves, signal - signal.mean(), rcond=None)[0]
 
 
 def reversals(recording: Recording) -> tuple[NDArray[np.intp], Array, NDArray[np.intp]]:
-    """Ticks at which the motor reverses, well apart from each other, and the direction after each;
-    ticks of the others, which come too soon after one another to be measured."""
-    from scipy.ndimage import gaussian_filter1d  # Late: it takes its time.
+    """Locate the reversals of the motor.
+
+    Returns
+    -------
+    tuple of three arrays
+        Ticks of the isolated reversals, at least `SEPARATION` from their neighbours; the direction
+        of motion after each, -1 or 1; and ticks of the crowded reversals, whose jumps overlap.
+    """
+    # scipy.ndimage is imported here because it takes long to load.
+    from scipy.ndimage import gaussian_filter1d
 
     travel = _without_hum(recording.column("/sensor", "suspension_lvdt"), recording.time)
     velocity = np.gradient(
         gaussian_filter1d(travel, SMOOTHING / recording.period),
         recording.period,
     )
-    all_of_them = np.flatnonzero(np.diff(np.sign(velocity)) != 0)
-    gap = APART / recording.period
-    behind = np.diff(all_of_them, prepend=-gap) >= gap
-    alone = behind & (np.diff(all_of_them, append=recording.ticks + gap) >= gap)
-    found = all_of_them[alone]
-    return found, np.sign(velocity[np.minimum(found + 5, recording.ticks - 1)]), all_of_them[~alone]
+    crossings = np.flatnonzero(np.diff(np.sign(velocity)) != 0)
+    gap = SEPARATION / recording.period
+    behind = np.diff(crossings, prepend=-gap) >= gap
+    alone = behind & (np.diff(crossings, append=recording.ticks + gap) >= gap)
+    isolated = crossings[alone]
+    # A few ticks later the velocity has clearly left zero, so that its sign is certain.
+    after = np.minimum(isolated + 5, recording.ticks - 1)
+    return isolated, np.sign(velocity[after]), crossings[~alone]
 
 
 def find_compensator(recording: Recording, settings: Settings, seed: int = 0) -> Calibration:
-    """Finds the compensator's settings from a recording made without compensation. settings: those
-    that it was made with.
+    """Identify the compensator's settings from a recording made without compensation.
 
-    Raises RigtwinError if it was made with compensation, has values that are no numbers or too few
-    reversals, or its force does not jump at them.
+    Parameters
+    ----------
+    recording
+        Recording made without compensation.
+    settings
+        Settings of the controller that made the recording.
+    seed
+        Seed of the search.
+
+    Returns
+    -------
+    Calibration
+        Settings with the least force error, and the detector's performance with them.
+
+    Raises
+    ------
+    RigtwinError
+        If the recording was made with compensation, has values that are not finite, has too few
+        reversals, or its force does not jump at them.
     """
-    from scipy.optimize import differential_evolution  # Late: it takes its time.
-
-    if settings.compensator != Compensator.NONE:
-        told = f"recorded with compensator {settings.compensator.label!r}; expected 'none'"
-        raise RigtwinError(f"{recording.path}: {told}")
-    period, time = recording.period, recording.time
-    for topic, name in USED:
-        if not np.isfinite(recording.column(topic, name)).all():
-            raise RigtwinError(f"{recording.path}: {topic}.{name} has values that are no numbers")
-    turns, directions, others = reversals(recording)
-    beside = round(BESIDE / period)
-    inside = (turns > beside) & (turns < recording.ticks - 3 * beside)
+    _check_recording(recording, settings)
+    period = recording.period
+    turns, directions, crowded = reversals(recording)
+    window = round(WINDOW / period)
+    # A reversal too close to either end has no complete window.
+    inside = (turns > window) & (turns < recording.ticks - 3 * window)
     turns, directions = turns[inside], directions[inside]
-    if len(turns) < FEWEST:
+    if len(turns) < MIN_REVERSALS:
         raise RigtwinError(
-            f"{recording.path}: the motor reverses {len(turns)} times; expected {FEWEST} or more",
+            f"{recording.path}: the motor reverses {len(turns)} times; "
+            f"expected at least {MIN_REVERSALS}",
         )
-    told = MOTOR_CONSTANT * recording.column("/command", "voltage")
+    ticks, coulomb = _measure_jumps(recording, turns, directions, window)
     cell = recording.column("/sensor", "load_cell")
-    friction = _without_hum(filter_lag(told, MOTOR_LAG, period) - cell, time)
-    # Where it jumps, within the uncertainty of the velocity: there the difference of what is felt
-    # before and after is largest.
-    pairs = zip(turns, directions, strict=True)
-    jumps = [_jump(friction, tick, way, beside) for tick, way in pairs]
-    ticks = np.array([tick for tick, _ in jumps])
-    coulomb = 0.5 * float(np.median([size for _, size in jumps]))
-    if not LEAST_FRICTION < coulomb < MOST_FRICTION:
-        told = f"at its reversals the force jumps by {2 * coulomb:.3g} N"
-        raise RigtwinError(f"{recording.path}: {told}, which is no dry friction")
     errors = recording.column("/command", "force") - filter_lag(cell, settings.filter_force, period)
+    # Before a reversal the error is the steady tracking error; friction causes the rise above it.
     steady = directions * np.array(
-        [np.mean(errors[tick - beside : tick - beside // 4]) for tick in ticks],
+        [np.mean(errors[tick - window : tick - window // 4]) for tick in ticks],
     )
     pairs = zip(ticks, directions, strict=True)
-    rises = np.array([way * errors[tick : tick + 2 * beside] for tick, way in pairs])
+    rises = np.array([way * errors[tick : tick + 2 * window] for tick, way in pairs])
     envelope = np.mean(rises - steady[:, None], axis=0)
-    turned = coulomb * _directions(recording.ticks, ticks, directions, others)
+    friction = coulomb * _directions(recording.ticks, ticks, directions, crowded)
+    # A reversal turns friction from -F to +F, so the compensating step is 2 F.
     base = settings._replace(compensator=Compensator.ONE_STEP, friction_step=2 * coulomb)
     travels = recording.column("/sensor", "suspension_lvdt")
-    test = _Test(travels, np.zeros(recording.ticks), turned, period)
+    test = _Test(travels, np.zeros(recording.ticks), friction, period)
     due, steps = np.empty(recording.ticks), np.empty(recording.ticks)
     _close_loop(base, False, test, due, steps)
     test = test._replace(rest=errors - due)
 
-    def set_values(values: Array) -> Settings:
-        found = base._replace(**dict(zip(BOUNDS, values.tolist(), strict=True)))
-        return found._replace(spike_samples=float(int(found.spike_samples)))
-
-    def left(values: Array) -> float:
-        return float(_close_loop(set_values(values), True, test, due, steps))
-
-    found = differential_evolution(
-        left,
-        list(BOUNDS.values()),
-        popsize=8,
-        maxiter=25,
-        tol=1e-3,
-        polish=False,
-        rng=np.random.default_rng(seed),
-    )
-    best = set_values(np.asarray(found.x))
+    best = _search_settings(base, test, seed)
     _close_loop(best, True, test, due, steps)
-    delays, false = _match_steps(steps, ticks, directions, len(envelope), others)
+    # The search minimises the force error alone; detections and false steps only describe the
+    # result.
+    delays, false = _match_steps(steps, ticks, directions, len(envelope), crowded)
     delay = float(np.median(delays)) * period if delays else float("nan")
     return Calibration(
         settings=best,
@@ -280,28 +332,96 @@ def find_compensator(recording: Recording, settings: Settings, seed: int = 0) ->
     )
 
 
+def _search_settings(base: Settings, test: _Test, seed: int) -> Settings:
+    """Return the settings within BOUNDS whose compensator leaves the least force error."""
+    # scipy.optimize is imported here because it takes long to load.
+    from scipy.optimize import differential_evolution
+
+    due, steps = np.empty(len(test.travels)), np.empty(len(test.travels))
+
+    def set_values(values: Array) -> Settings:
+        changed = base._replace(**dict(zip(BOUNDS, values.tolist(), strict=True)))
+        return changed._replace(spike_samples=float(int(changed.spike_samples)))
+
+    def mean_square_error(values: Array) -> float:
+        return float(_close_loop(set_values(values), True, test, due, steps))
+
+    # The detector's thresholds make the error piecewise constant in places, so the search must not
+    # need gradients, and no polishing step follows it.
+    optimum = differential_evolution(
+        mean_square_error,
+        list(BOUNDS.values()),
+        popsize=8,
+        maxiter=25,
+        tol=1e-3,
+        polish=False,
+        rng=np.random.default_rng(seed),
+    )
+    return set_values(np.asarray(optimum.x))
+
+
+def _check_recording(recording: Recording, settings: Settings) -> None:
+    """Raise RigtwinError unless the recording was made uncompensated and is finite."""
+    if settings.compensator != Compensator.NONE:
+        state = f"recorded with compensator {settings.compensator.label!r}; expected 'none'"
+        raise RigtwinError(f"{recording.path}: {state}")
+    for topic, name in REQUIRED:
+        if not np.isfinite(recording.column(topic, name)).all():
+            raise RigtwinError(
+                f"{recording.path}: {topic}.{name} has values that are not finite; "
+                "expected finite numbers at every tick"
+            )
+
+
+def _measure_jumps(
+    recording: Recording, turns: NDArray[np.intp], directions: Array, window: int
+) -> tuple[NDArray[np.intp], float]:
+    """Return the tick of the force's jump at each reversal, and the Coulomb force, in N."""
+    # Friction = commanded motor force, delayed by the motor's lag, minus the measured force.
+    command = MOTOR_CONSTANT * recording.column("/command", "voltage")
+    cell = recording.column("/sensor", "load_cell")
+    friction = _without_hum(filter_lag(command, MOTOR_LAG, recording.period) - cell, recording.time)
+    # The velocity locates a reversal only roughly. The jump is where the difference of the mean
+    # force before and after is largest.
+    pairs = zip(turns, directions, strict=True)
+    jumps = [_jump(friction, tick, way, window) for tick, way in pairs]
+    coulomb = 0.5 * float(np.median([size for _, size in jumps]))
+    if not LEAST_FRICTION < coulomb < MOST_FRICTION:
+        jump = f"at its reversals the force jumps by {2 * coulomb:.3g} N"
+        raise RigtwinError(
+            f"{recording.path}: {jump}; expected dry friction, "
+            f"{2 * LEAST_FRICTION:g} to {2 * MOST_FRICTION:g} N"
+        )
+    return np.array([tick for tick, _ in jumps]), coulomb
+
+
 def _directions(
     count: int,
     ticks: NDArray[np.intp],
     directions: Array,
-    others: NDArray[np.intp],
+    crowded: NDArray[np.intp],
 ) -> Array:
-    """Direction of the motion at every tick: it changes at the reversals, and at each of the
-    others."""
+    """Return the direction of motion at each tick, which changes at every reversal."""
     way = np.empty(count)
+    # Before the first reversal the motion has the opposite direction.
     way[: ticks[0]] = -directions[0]
     for first, last, direction in zip(ticks, [*ticks[1:], count], directions, strict=True):
         way[first:last] = direction
-        for number in others[(others > first) & (others < last)]:
+        for number in crowded[(crowded > first) & (crowded < last)]:
             way[number:last] *= -1.0
     return way
 
 
-def _jump(friction: Array, tick: int, way: float, beside: int) -> tuple[int, float]:
-    """The tick near a reversal at which friction rises most towards `way`, and by how much."""
-    near = np.arange(max(tick - beside, beside), tick + beside)
+def _jump(friction: Array, tick: int, way: float, window: int) -> tuple[int, float]:
+    """Return the tick near a reversal where friction rises most towards `way`, and the rise in N.
+
+    Means over half a window come from differences of one cumulative sum.
+    """
+    near = np.arange(max(tick - window, window), tick + window)
+    # The cumulative sum has a leading zero, so that total[b] − total[a] sums the samples a to b −
+    # 1.
     total = np.concatenate([[0.0], np.cumsum(friction)])
-    half = beside // 2
+    half = window // 2
     after = (total[near + half] - total[near]) / half
     before = (total[near] - total[near - half]) / half
     best = int(np.argmax(way * (after - before)))
@@ -313,18 +433,21 @@ def _match_steps(
     turns: NDArray[np.intp],
     directions: Array,
     within: int,
-    others: NDArray[np.intp],
+    crowded: NDArray[np.intp],
 ) -> tuple[list[int], int]:
-    """Ticks from each reversal that is detected to its detection, and how many steps were false. A
-    step near one of the `others` is not held against it."""
+    """Return the ticks from each detected reversal to its detection, and the number of false steps.
+
+    A step near a crowded reversal counts as neither.
+    """
     made = np.flatnonzero(steps)
     used, delays = np.zeros(len(made), bool), []
     for turn, way in zip(turns, directions, strict=True):
+        # The reversal's own tick is uncertain by a few ticks, so a slightly early step counts.
         first, last = np.searchsorted(made, [turn - 3, turn + within])
         hits = [number for number in range(first, last) if steps[made[number]] == way]
         if hits:
             used[hits[0]] = True
             delays.append(max(int(made[hits[0]] - turn), 0))
     wrong = made[~used]
-    near = np.searchsorted(others, wrong - within) != np.searchsorted(others, wrong + within)
+    near = np.searchsorted(crowded, wrong - within) != np.searchsorted(crowded, wrong + within)
     return delays, int(np.sum(~near))

@@ -1,8 +1,8 @@
-"""What a machine's sensors can never show, whatever it does: before there are any data.
+"""Structural identifiability: the effects a machine's sensors can reveal, before any data exist.
 
-Every effect is given to the machine's model under made-up rich motions. One that changes nothing
-that is recorded can never be seen. One whose changes are those of others, in every one of these
-motions at once, can never be told from them: only what they do together is known.
+The machine's model is simulated under synthetic rich motions, with one effect after another. An
+effect that changes no recorded signal is unobservable. An effect whose changes equal a combination
+of other effects' changes, in all motions at once, is confounded with them: only their sum is known.
 """
 
 from __future__ import annotations
@@ -26,58 +26,58 @@ from rigtwin.models.model import Model
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
 
-NOTHING = 1e-7
-"""rms of a change, in units of the signals' own rms, below which an effect does nothing."""
-LEFT = 0.01
-"""Share of an effect's change that others have to leave at most for it not to be told from
-them."""
+NO_CHANGE = 1e-7
+"""RMS of a change, relative to the signals' own RMS, below which an effect is unobservable."""
+UNEXPLAINED = 0.01
+"""Share of an effect's change that a combination of other effects may leave unexplained while the
+effect still counts as confounded with them."""
 NEAR = 0.1
-"""The same of what a little of it changes, from which it is tried whether they do."""
+"""Same share for the linearised change; a combination below it is tested at full size."""
 TOGETHER = 3
-"""Others that may have to act together."""
+"""Maximum number of effects in a confounded combination."""
 BASIC = ("coulomb", "viscous")
-"""Kinds that others refine."""
+"""Kinds of effect that other kinds refine."""
 FORCELESS = 1e-9
-"""N, rms, below which no force is predicted at all."""
+"""RMS of predicted forces, in N, below which a machine counts as free of forces."""
 RANK = 1e-10
-"""Of a set of changes: what is smaller is rounding."""
+"""Relative singular value below which a direction of a set of changes is rounding."""
 EVALUATIONS = 12
-"""Of a fit of others to what an effect does."""
+"""Maximum number of evaluations when effects are fitted to another effect's change."""
 STEPS = 4
-"""Of integration a tick."""
+"""Number of integration steps per tick."""
 
 
 @dataclass(frozen=True)
 class Identifiability:
-    """What made-up motions say of a machine's effects.
+    """Observable, unobservable and confounded effects of a machine.
 
     Parameters
     ----------
     seen : tuple of str
-        Effects that leave a trace of their own.
+        Effects that can be told from all others.
     unseen : tuple of str
-        Those that change nothing that is recorded.
-    alike : mapping
-        Effect → others that together do what it does.
+        Effects that change no recorded signal.
+    confounded : mapping
+        Effect → effects that together produce the same change.
     motions : tuple of str
-        What it was tried on; empty where nothing says how far the machine may move.
+        Synthetic motions used. Empty if the description does not limit the machine's motion.
     sums : tuple of mappings
-        Base parameters of bodies and rotors of joints that act on each other, however far they
-        move: parameter → its coefficient (`find_base_parameters`).
+        Base parameters of bodies and rotors whose joints act on each other: parameter →
+        coefficient (see `find_base_parameters`). They do not depend on the range of motion.
     untried : tuple of str
         Effects for which the allowed time did not suffice.
     """
 
     seen: tuple[str, ...]
     unseen: tuple[str, ...]
-    alike: Mapping[str, tuple[str, ...]]
+    confounded: Mapping[str, tuple[str, ...]]
     motions: tuple[str, ...]
     sums: tuple[Mapping[str, float], ...] = ()
     untried: tuple[str, ...] = ()
 
 
 class _OutOfTime(Exception):
-    """The time that was allowed is over."""
+    """The allowed time is over."""
 
 
 def find_identifiable(
@@ -85,27 +85,27 @@ def find_identifiable(
     seconds: float = math.inf,
     progress: Callable[[str], object] = lambda _: None,
 ) -> Identifiability:
-    """What the sensors of a machine can show of its effects, and what they never can.
+    """Return which effects of a machine its sensors can identify.
 
     Parameters
     ----------
     machine
-        Its description.
+        Machine under study.
     seconds
-        Time that the work may take, s; effects that it does not suffice for are `untried`.
+        Allowed time, s; effects for which it does not suffice are `untried`.
     progress
-        Called with the name of what is worked out next.
+        Called with the name of the next step.
 
     Returns
     -------
     Identifiability
-        Of all effects that are searched for; empty but for its sums where the description does not
-        say how far the machine may move: its joints need a range, or it needs an experiment.
+        Result for all effects that a diagnosis searches. Only `sums` is filled if the description
+        does not limit the motion: joints need a range, or the machine needs an experiment.
 
     Raises
     ------
     RigtwinError
-        If one of its own experiments cannot be run.
+        If an experiment of the machine cannot be simulated.
     """
     until = time.monotonic() + seconds
     searched = [effect for effect in machine.effects() if effect.searched]
@@ -117,10 +117,10 @@ def find_identifiable(
     motions = tuple(str(recording.experiment) for recording in recordings)
     responses: dict[str, Array | None] = {}
     try:
-        tried = _Tried(machine, recordings, until)
+        trial = _Trial(machine, recordings, until)
         for number, effect in enumerate(searched, 1):
             progress(f"{effect.name}, {number} of {len(searched)}")
-            responses[effect.name] = tried.response(effect)
+            responses[effect.name] = trial.response(effect)
     except _OutOfTime:
         untried = tuple(each.name for each in searched if each.name not in responses)
         unseen = tuple(name for name, shape in responses.items() if shape is None)
@@ -129,28 +129,31 @@ def find_identifiable(
     unseen = tuple(name for name, shape in responses.items() if shape is None)
     shapes = {name: shape for name, shape in responses.items() if shape is not None}
     effects = {each.name: each for each in searched if each.name in shapes}
-    alike: dict[str, tuple[str, ...]] = {}
+    confounded: dict[str, tuple[str, ...]] = {}
     untried: tuple[str, ...] = ()
     for number, (name, shape) in enumerate(shapes.items(), 1):
         progress(f"rivals of {name}, {number} of {len(shapes)}")
         rivals = {n: s for n, s in shapes.items() if not _shares(effects[n], effects[name])}
         try:
-            for others in _propose(shape, rivals):
-                if tried.stands_for([effects[n] for n in others], effects[name]):
-                    alike[name] = others
+            for combination in _propose(shape, rivals):
+                if trial.reproduces([effects[n] for n in combination], effects[name]):
+                    confounded[name] = combination
                     break
         except _OutOfTime:
             untried = (*untried, name)
-    known = {*unseen, *alike, *untried}
+    known = {*unseen, *confounded, *untried}
     seen = tuple(name for name in responses if name not in known)
-    return Identifiability(seen, unseen, alike, motions, sums, untried)
+    return Identifiability(seen, unseen, confounded, motions, sums, untried)
 
 
-class _Tried:
-    """A machine's model under made-up motions."""
+class _Trial:
+    """Model of a machine under the synthetic motions.
+
+    Predictions are divided by the RMS of each signal, so that all signals weigh the same.
+    """
 
     def __init__(self, machine: Machine, recordings: Sequence[Recording], until: float) -> None:
-        """until: moment at which the time is over, as `time.monotonic` has it."""
+        """Simulate the motions until a moment, as `time.monotonic` has it."""
         self._machine, self.plant, self._until = machine, machine.plant, until
         self._period = recordings[0].period
         self._models: list[Model[Any]] = [
@@ -163,15 +166,16 @@ class _Tried:
         self._size = np.ones((len(machine.rows), 1))
         moved = self._predict(self.plant)
         rms = np.sqrt(np.mean(moved**2, axis=1, keepdims=True))
+        # A signal that stays zero must not divide by zero.
         self._size = np.maximum(rms, 1e-12)
-        # Refinements of friction do nothing where there is none.
+        # Refinements of dry friction have no effect without it, so friction is added first.
         for effect in machine.effects():
             if effect.kind.name in BASIC and not any(effect.nominal(machine.plant).values()):
                 values = self._starts(effect).values
                 self.plant = with_values(
                     self.plant, (effect,), (min(v for v in values if v[0] > 0.0),)
                 )
-        self._here = self._predict(self.plant)
+        self._baseline = self._predict(self.plant)
 
     def _predict(self, plant: Plant) -> Array:
         if time.monotonic() > self._until:
@@ -187,7 +191,7 @@ class _Tried:
             if row.kind == "force"
         ]
         force = max(forces, default=0.0)
-        # A guide that nothing is known of bears no force; then any unit of it will do.
+        # Without any predicted force the scale is arbitrary, because effects are compared in shape.
         return Scales.of(motion, force if force > FORCELESS else 1.0, self._period)
 
     def _starts(self, effect: Effect) -> Starts:
@@ -195,66 +199,76 @@ class _Tried:
         return effect.starts(self.plant, swing, lambda: self._scales(effect.group))
 
     def response(self, effect: Effect) -> Array | None:
-        """What a little of an effect changes, of length 1, all signals one after another; if that
-        is nothing, what the smallest size does that does anything; None if none does."""
+        """Return the change of all signals by a small effect, normalised to length 1.
+
+        If a small effect changes nothing, the smallest start that changes anything is used. None
+        if no start does.
+        """
         if not is_possible((effect,), self.plant):
             return None
-        there = tuple(effect.nominal(self.plant).values())
+        nominal = tuple(effect.nominal(self.plant).values())
         starts = self._starts(effect)
-        sizes = sorted(starts.values, key=lambda values: abs(values[0] - there[0]))
-        little = (there[0] + starts.steps[0], *sizes[0][1:])
+        sizes = sorted(starts.values, key=lambda values: abs(values[0] - nominal[0]))
+        little = (nominal[0] + starts.steps[0], *sizes[0][1:])
         for values in (little, *sizes):
-            if values == there:
+            if values == nominal:
                 continue
-            change = self._predict(with_values(self.plant, (effect,), (values,))) - self._here
-            if float(np.sqrt(np.mean(change**2))) > NOTHING:
+            change = self._predict(with_values(self.plant, (effect,), (values,))) - self._baseline
+            if float(np.sqrt(np.mean(change**2))) > NO_CHANGE:
                 return np.ravel(change) / float(np.linalg.norm(change))
         return None
 
-    def stands_for(self, others: Sequence[Effect], effect: Effect) -> bool:
-        """Whether others can do what a good deal of an effect does, not only what a little does:
-        as far as a delay is a lag at low frequencies."""
-        there = tuple(effect.nominal(self.plant).values())
-        sizes = sorted(self._starts(effect).values, key=lambda values: abs(values[0] - there[0]))
-        wanted = self._predict(with_values(self.plant, (effect,), (sizes[len(sizes) // 2],)))
-        change = float(np.linalg.norm(wanted - self._here))
-        rest = [tuple(each.nominal(self.plant).values()) for each in others]
-        steps = np.array([self._starts(each).steps[0] for each in others])
-        quantities = [each.quantities()[each.kind.parameters[0]] for each in others]
+    def reproduces(self, combination: Sequence[Effect], effect: Effect) -> bool:
+        """Return whether a combination of effects reproduces an effect of medium size.
 
-        def left(point: Array) -> Array:
-            # About 1, since the solver's steps are shares of where it stands.
+        Linear dependence of small changes is not enough: a delay equals a lag only while small.
+        """
+        nominal = tuple(effect.nominal(self.plant).values())
+        sizes = sorted(self._starts(effect).values, key=lambda values: abs(values[0] - nominal[0]))
+        target = self._predict(with_values(self.plant, (effect,), (sizes[len(sizes) // 2],)))
+        change = float(np.linalg.norm(target - self._baseline))
+        rest = [tuple(e.nominal(self.plant).values()) for e in combination]
+        steps = np.array([self._starts(e).steps[0] for e in combination])
+        quantities = [e.quantities()[e.kind.parameters[0]] for e in combination]
+
+        def residual(point: Array) -> Array:
+            # The search starts at 1, not 0, because the solver's difference steps are relative.
             moved = point - 1.0
             values = [
-                (min(max(own[0] + step * by, q.low), q.high), *own[1:])
-                for own, step, by, q in zip(rest, steps, moved, quantities, strict=True)
+                (min(max(start[0] + step * by, q.low), q.high), *start[1:])
+                for start, step, by, q in zip(rest, steps, moved, quantities, strict=True)
             ]
-            return np.ravel(wanted - self._predict(with_values(self.plant, others, values)))
+            return np.ravel(target - self._predict(with_values(self.plant, combination, values)))
 
-        fit = least_squares(left, np.ones(len(others)), diff_step=1.0, max_nfev=EVALUATIONS)
-        return change > 0.0 and float(np.linalg.norm(fit.fun)) < LEFT * change
-
-
-def _shares(one: Effect, other: Effect) -> bool:
-    """Whether both are values of one parameter."""
-    common = set(one.kind.parameters) & set(other.kind.parameters)
-    return one.group == other.group and bool(common)
+        start = np.ones(len(combination))
+        fit = least_squares(residual, start, diff_step=1.0, max_nfev=EVALUATIONS)
+        return change > 0.0 and float(np.linalg.norm(fit.fun)) < UNEXPLAINED * change
 
 
-def _propose(shape: Array, others: Mapping[str, Array]) -> Iterator[tuple[str, ...]]:
-    """Others that may do the same together, the fewest first: of all of them, the one that is
-    missed least is left out, one after another."""
-    names, columns = list(others), np.array(list(others.values()))
+def _shares(first: Effect, second: Effect) -> bool:
+    """Return whether two effects set the same parameter."""
+    common = set(first.kind.parameters) & set(second.kind.parameters)
+    return first.group == second.group and bool(common)
+
+
+def _propose(shape: Array, rivals: Mapping[str, Array]) -> Iterator[tuple[str, ...]]:
+    """Propose combinations of rivals that may reproduce a shape, the smallest first.
+
+    Backward elimination: starting from all rivals, the one whose removal raises the residual least
+    is removed in each round, while the residual stays below NEAR.
+    """
+    names, columns = list(rivals), np.array(list(rivals.values()))
+    # All shapes have length 1, so every projection follows from the Gram matrix alone.
     gram, shared = columns @ columns.T, columns @ shape
 
-    def left(chosen: list[int]) -> float:
-        part, own = gram[np.ix_(chosen, chosen)], shared[chosen]
-        return 1.0 - float(own @ np.linalg.lstsq(part, own, rcond=RANK)[0])
+    def residual(chosen: list[int]) -> float:
+        part, target = gram[np.ix_(chosen, chosen)], shared[chosen]
+        return 1.0 - float(target @ np.linalg.lstsq(part, target, rcond=RANK)[0])
 
     chosen = list(range(len(names)))
-    found: list[tuple[str, ...]] = []
-    while chosen and left(chosen) < NEAR**2:
+    combinations: list[tuple[str, ...]] = []
+    while chosen and residual(chosen) < NEAR**2:
         if len(chosen) <= TOGETHER:
-            found.append(tuple(names[n] for n in chosen))
-        chosen.remove(min(chosen, key=lambda n: left([c for c in chosen if c != n])))
-    yield from reversed(found)
+            combinations.append(tuple(names[n] for n in chosen))
+        chosen.remove(min(chosen, key=lambda n: residual([c for c in chosen if c != n])))
+    yield from reversed(combinations)

@@ -1,4 +1,4 @@
-"""What a loop in real time asks of the system."""
+"""Privileges that a loop in real time requests from the system."""
 
 from __future__ import annotations
 
@@ -7,9 +7,14 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Grant:
-    """One thing that a loop in real time wants of the system.
+    """Result of one request.
 
-    lacking: why it is not there and how to get it, or empty.
+    Attributes
+    ----------
+    name
+        Name of the privilege.
+    lacking
+        Why it was refused, and how to obtain it; empty if it was granted.
     """
 
     name: str

@@ -25,6 +25,7 @@ STOP_SIGNALS: tuple[int, ...] = (
     signal.SIGTERM,
     signal.SIGHUP,
     signal.SIGQUIT,
+    # Ctrl-Z would suspend the loop while the rig moves.
     signal.SIGTSTP,
 )
 RENDERER = "egl" if sys.platform == "linux" else "glfw"
@@ -35,14 +36,14 @@ RESOLUTION = time.get_clock_info("monotonic").resolution
 
 
 def lock_file(handle: int) -> None:
-    """Makes a file this program's own for as long as it is open; OSError if it is another's."""
+    """Lock a file for as long as it is open. Raise OSError if another program has locked it."""
     fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
 @contextmanager
 def no_interrupts() -> Iterator[None]:
-    """Keeps Ctrl-C from this thread, and from processes that are started meanwhile for good."""
-    # It is started with the first process, and lets interruptions through when it is.
+    """Block Ctrl-C in this thread, and permanently in processes started inside this context."""
+    # Starting the first process also starts the resource tracker, which unblocks SIGINT again.
     resource_tracker.ensure_running()
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
@@ -53,10 +54,10 @@ def no_interrupts() -> Iterator[None]:
 
 @contextmanager
 def read_keys() -> Iterator[Callable[[], bool] | None]:
-    """Gives a function that takes a key of the terminal, if one was pressed; None where there is no
-    terminal."""
+    """Provide a function that returns whether a key was pressed; None without a terminal."""
     try:
         terminal = sys.stdin.fileno() if sys.stdin and sys.stdin.isatty() else None
+        # A background process must not read the terminal: the system would stop it (SIGTTIN).
         ours = terminal is not None and os.getpgrp() == os.tcgetpgrp(terminal)
     except OSError:
         terminal, ours = None, False
@@ -64,6 +65,7 @@ def read_keys() -> Iterator[Callable[[], bool] | None]:
         yield None
         return
     before = termios.tcgetattr(terminal)
+    # Without canonical mode a key arrives without Enter.
     tty.setcbreak(terminal)
 
     def pressed() -> bool:
@@ -79,8 +81,7 @@ def read_keys() -> Iterator[Callable[[], bool] | None]:
 
 
 def leave_terminal() -> None:
-    """What a terminal sends to all its programs, this one gets no more: Ctrl-C, Ctrl-Z, hanging
-    up."""
+    """Detach from the terminal, so that Ctrl-C, Ctrl-Z and hang-up do not reach this process."""
     with suppress(OSError):
         os.setsid()
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT):
@@ -89,16 +90,19 @@ def leave_terminal() -> None:
 
 @contextmanager
 def watch_process(number: int) -> Iterator[Callable[[float], bool]]:
-    """Gives a function that waits up to some seconds for a process to end, and says if it has. Only
-    this process' own parent is looked for where the system has no handles of processes."""
-    if not hasattr(os, "pidfd_open"):
+    """Provide a function that waits up to some seconds for a process, and returns whether it ended.
 
+    Without process handles (pidfd, Linux only) just the parent process can be watched.
+    """
+    if not hasattr(os, "pidfd_open"):
+        # An orphan gets another parent.
         def ended(seconds: float) -> bool:
             time.sleep(seconds)
             return os.getppid() != number
 
         yield ended
         return
+    # A handle refers to this process even if its number is used again.
     handle = os.pidfd_open(number)
     try:
         yield lambda seconds: bool(select.select([handle], [], [], seconds)[0])
@@ -107,25 +111,27 @@ def watch_process(number: int) -> Iterator[Callable[[float], bool]]:
 
 
 def kill_process(number: int) -> None:
-    """Ends a process at once, if it is there."""
+    """Kill a process at once, if it exists."""
     with suppress(ProcessLookupError):
         os.kill(number, signal.SIGKILL)
 
 
 def freeze_process(number: int) -> None:
-    """Stops a process where it is, for a trial of what watches it."""
+    """Suspend a process, to test what watches it."""
     os.kill(number, signal.SIGSTOP)
 
 
 def raise_signal(number: int) -> None:
-    """Sends a signal to this process."""
+    """Send a signal to this process."""
     os.kill(os.getpid(), number)
 
 
 @contextmanager
 def limit_files() -> Iterator[Callable[[int], None]]:
-    """Gives a function after which no file of this program grows beyond some bytes, as on a full
-    disk; for a trial."""
+    """Provide a function that limits the size of this program's files in bytes, as a full disk.
+
+    It is used in tests.
+    """
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     try:
         yield lambda size: resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
@@ -138,9 +144,10 @@ def _libc() -> ctypes.CDLL:
 
 
 def lock_memory() -> Grant:
-    """Keeps all memory of this program in memory."""
+    """Lock the memory of this program, so that no page has to be loaded from disk."""
     if sys.platform != "linux":
         return Grant(MEMORY, f"not known how on {sys.platform}")
+    # ctypes keeps errno per thread only with use_errno.
     if _libc().mlockall(_MCL_CURRENT | _MCL_FUTURE) != 0:
         reason = os.strerror(ctypes.get_errno())
         return Grant(MEMORY, f"{reason}; raise it with: ulimit -l unlimited")
@@ -148,19 +155,19 @@ def lock_memory() -> Grant:
 
 
 def unlock_memory() -> None:
-    """Takes it back."""
+    """Unlock the memory."""
     _libc().munlockall()
 
 
 def return_memory() -> None:
-    """Gives back what the program has freed, which the C library may keep for itself."""
+    """Return freed memory to the system, which the C library might keep."""
     trim = getattr(_libc(), "malloc_trim", None)
     if trim is not None:
         trim(0)
 
 
 def raise_priority(priority: int) -> Grant:
-    """Puts this thread before all others of the computer but those above it. priority: 1 to 99."""
+    """Give this thread FIFO scheduling with a priority from 1 to 99."""
     if not hasattr(os, "sched_setscheduler"):
         return Grant(SCHEDULING, f"not known how on {sys.platform}")
     try:
@@ -172,22 +179,22 @@ def raise_priority(priority: int) -> Grant:
 
 
 def lower_priority() -> None:
-    """Takes it back."""
+    """Return to normal scheduling."""
     os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
 
 
 def count_cores() -> int:
-    """That this program may run on."""
+    """Return the number of cores that this program may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
 
 
 def cache_folder() -> Path:
-    """Where this user's programs keep what they can make again."""
+    """Return the folder for the user's cached files."""
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
 
 
 def is_superuser() -> bool:
-    """Whether this program runs as root."""
+    """Return whether this program runs as root."""
     return os.geteuid() == 0

@@ -1,6 +1,6 @@
-"""Windows, by the documented calls of kernel32, shell32, winmm and the C library.
+"""Windows, by documented calls of kernel32, shell32, winmm and the C library.
 
-Each call is named where it is made; learn.microsoft.com has a page of each.
+Docstrings name the calls; learn.microsoft.com documents each of them.
 """
 
 from __future__ import annotations
@@ -33,16 +33,16 @@ _SYNCHRONIZE, _TERMINATE = 0x0010_0000, 0x0001
 _ENDED, _RUNS = 0x0, 0x102
 """WAIT_OBJECT_0 and WAIT_TIMEOUT."""
 _GRAIN = 1
-"""ms: the finest grain of the system's timers that can be asked for."""
+"""Finest resolution of the system's timers that can be requested, in ms."""
 
-# Of time.monotonic the steps are 15.6 ms here; this is QueryPerformanceCounter, one for all
-# processes.
+# time.monotonic has steps of 15.6 ms on Windows. perf_counter is QueryPerformanceCounter, which all
+# processes share.
 monotonic = time.perf_counter
 RESOLUTION = time.get_clock_info("perf_counter").resolution
 
 
 def _library(name: str) -> Any:
-    """A system library; 64-bit handles go through as they are."""
+    """Return a system library that passes 64-bit handles unchanged."""
     library = getattr(ctypes, "WinDLL")(name, use_last_error=True)  # noqa: B009 - of Windows alone
     for call in ("GetCurrentProcess", "GetCurrentThread", "OpenProcess"):
         if name == "kernel32":
@@ -55,14 +55,15 @@ def _handle(value: int | None) -> ctypes.c_void_p:
 
 
 def _reason() -> str:
+    """Return the last error of Windows in words."""
     number = getattr(ctypes, "get_last_error")()  # noqa: B009 - of Windows alone
     return f"error {number} of Windows"
 
 
 def lock_file(handle: int) -> None:
-    """Makes a file this program's own for as long as it is open; OSError if it is another's.
+    """Lock a file for as long as it is open. Raise OSError if another program has locked it.
 
-    `_locking` of one byte far behind the end, so that others may read what is there.
+    `_locking` locks one byte far beyond the end, so that other programs can read the content.
     """
     msvcrt = import_module("msvcrt")
     os.lseek(handle, 1 << 30, os.SEEK_SET)
@@ -74,9 +75,9 @@ def lock_file(handle: int) -> None:
 
 @contextmanager
 def no_interrupts() -> Iterator[None]:
-    """Keeps Ctrl-C from this program, and from processes that are started meanwhile for good.
+    """Block Ctrl-C in this program, and permanently in processes started inside this context.
 
-    SetConsoleCtrlHandler(NULL, TRUE), which new processes inherit.
+    SetConsoleCtrlHandler(NULL, TRUE) is inherited by new processes.
     """
     kernel = _library("kernel32")
     kernel.SetConsoleCtrlHandler(None, True)
@@ -88,8 +89,10 @@ def no_interrupts() -> Iterator[None]:
 
 @contextmanager
 def read_keys() -> Iterator[Callable[[], bool] | None]:
-    """Gives a function that takes a key of the console, if one was pressed; None where there is no
-    console. `_kbhit`, `_getwch`."""
+    """Provide a function that returns whether a key was pressed; None without a console.
+
+    It calls `_kbhit` and `_getwch`.
+    """
     if not (sys.stdin and sys.stdin.isatty()):
         yield None
         return
@@ -105,7 +108,7 @@ def read_keys() -> Iterator[Callable[[], bool] | None]:
 
 
 def leave_terminal() -> None:
-    """What a console sends to all its programs, this one gets no more."""
+    """Ignore the signals that a console sends to all its programs."""
     _library("kernel32").SetConsoleCtrlHandler(None, True)
     for number in STOP_SIGNALS:
         signal.signal(number, signal.SIG_IGN)
@@ -113,9 +116,10 @@ def leave_terminal() -> None:
 
 @contextmanager
 def watch_process(number: int) -> Iterator[Callable[[float], bool]]:
-    """Gives a function that waits up to some seconds for a process to end, and says if it has.
+    """Provide a function that waits up to some seconds for a process, and returns whether it ended.
 
-    OpenProcess, WaitForSingleObject, CloseHandle. Raises OSError if there is no such process.
+    It calls OpenProcess, WaitForSingleObject and CloseHandle. Raises OSError if there is no such
+    process.
     """
     kernel = _library("kernel32")
     opened = kernel.OpenProcess(_SYNCHRONIZE, False, number)
@@ -123,7 +127,7 @@ def watch_process(number: int) -> Iterator[Callable[[float], bool]]:
         raise OSError(f"process {number}: {_reason()}")
 
     def ended(seconds: float) -> bool:
-        # A wait of 0 ms does not wait at all, and would leave no core to the loop.
+        # A wait of 0 ms would not wait at all, and take a core away from the loop.
         milliseconds = max(_GRAIN, round(1e3 * seconds))
         return kernel.WaitForSingleObject(_handle(opened), milliseconds) == _ENDED
 
@@ -134,7 +138,7 @@ def watch_process(number: int) -> Iterator[Callable[[float], bool]]:
 
 
 def kill_process(number: int) -> None:
-    """Ends a process at once, if it is there. OpenProcess, TerminateProcess, CloseHandle."""
+    """Kill a process at once, if it exists: OpenProcess, TerminateProcess, CloseHandle."""
     kernel = _library("kernel32")
     opened = kernel.OpenProcess(_TERMINATE, False, number)
     if opened:
@@ -143,18 +147,18 @@ def kill_process(number: int) -> None:
 
 
 def freeze_process(number: int) -> None:
-    """Raises RigtwinError: Windows documents no such call."""
+    """Raise RigtwinError: Windows documents no call that suspends a process."""
     raise RigtwinError(f"process {number}: Windows has no way to freeze it; leave this trial out")
 
 
 def raise_signal(number: int) -> None:
-    """Sends a signal to this process."""
+    """Send a signal to this process."""
     signal.raise_signal(number)
 
 
 @contextmanager
 def limit_files() -> Iterator[Callable[[int], None]]:
-    """Gives a function that raises RigtwinError: Windows has no limit of a program's files."""
+    """Provide a function that raises RigtwinError: Windows cannot limit a program's files."""
 
     def limit(_: int) -> None:
         raise RigtwinError("Windows has no limit of a program's files; leave this trial out")
@@ -163,26 +167,30 @@ def limit_files() -> Iterator[Callable[[int], None]]:
 
 
 def lock_memory() -> Grant:
-    """Says that there is none: VirtualLock locks given pages, not a program."""
+    """Return a refusal: VirtualLock locks given pages, not a whole program."""
     return Grant(MEMORY, "Windows locks no program as a whole; leave enough memory free")
 
 
 def unlock_memory() -> None:
-    """Nothing was locked."""
+    """Do nothing: no memory was locked."""
 
 
 def return_memory() -> None:
-    """Nothing: the heap gives back what is free by itself."""
+    """Do nothing: the heap returns free memory by itself."""
 
 
 def raise_priority(priority: int) -> Grant:  # noqa: ARG001 - one class is all there is
-    """Puts this thread before all others: SetPriorityClass, SetThreadPriority; timeBeginPeriod."""
+    """Give this thread the highest priority.
+
+    Calls SetPriorityClass and SetThreadPriority, and timeBeginPeriod for a fine timer.
+    """
     kernel, timers = _library("kernel32"), _library("winmm")
+    # By default a sleep may end up to 15.6 ms late.
     timers.timeBeginPeriod(_GRAIN)
-    here = _handle(kernel.GetCurrentProcess())
-    granted = kernel.SetPriorityClass(here, _REALTIME)
-    # Without the right to it Windows gives the class below, and says that all went well.
-    if not granted or kernel.GetPriorityClass(here) != _REALTIME:
+    process = _handle(kernel.GetCurrentProcess())
+    granted = kernel.SetPriorityClass(process, _REALTIME)
+    # Without the privilege Windows silently grants the next lower class, so the result is checked.
+    if not granted or kernel.GetPriorityClass(process) != _REALTIME:
         lower_priority()
         return Grant(SCHEDULING, "REALTIME_PRIORITY_CLASS refused; start it as administrator")
     if not kernel.SetThreadPriority(_handle(kernel.GetCurrentThread()), _CRITICAL):
@@ -193,7 +201,7 @@ def raise_priority(priority: int) -> Grant:  # noqa: ARG001 - one class is all t
 
 
 def lower_priority() -> None:
-    """Takes it back."""
+    """Return to normal priority."""
     kernel, timers = _library("kernel32"), _library("winmm")
     kernel.SetThreadPriority(_handle(kernel.GetCurrentThread()), _USUAL)
     kernel.SetPriorityClass(_handle(kernel.GetCurrentProcess()), _NORMAL)
@@ -201,15 +209,15 @@ def lower_priority() -> None:
 
 
 def count_cores() -> int:
-    """That this computer has."""
+    """Return the number of cores of this computer."""
     return os.cpu_count() or 1
 
 
 def cache_folder() -> Path:
-    """Where this user's programs keep what they can make again."""
+    """Return the folder for the user's cached files."""
     return Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
 
 
 def is_superuser() -> bool:
-    """Whether this program runs as administrator. IsUserAnAdmin."""
+    """Return whether this program runs as administrator (IsUserAnAdmin)."""
     return bool(_library("shell32").IsUserAnAdmin())

@@ -1,4 +1,4 @@
-"""A twin beside a test that is running: the gap as it arises, and an alarm."""
+"""Watch over a running test: its gap to the twin as it arises, and an alarm."""
 
 from rigtwin.watching.alarm import Alarm, Suspect
 from rigtwin.watching.watch import Watch

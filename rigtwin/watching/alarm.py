@@ -1,4 +1,4 @@
-"""What a watch has to say."""
+"""Alarm of a watch, and the effects suspected behind it."""
 
 from __future__ import annotations
 
@@ -7,11 +7,18 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Suspect:
-    """An effect that may be behind a gap.
+    """Effect that may cause a gap.
 
-    effect: its name; values: parameter → value that explains most; explained: share of what is more
-    than noise and tolerances explain, 0 to 1; probability: among all effects that were tried, given
-    that it is one of them, below 1.
+    Attributes
+    ----------
+    effect
+        Name of the effect.
+    values
+        Parameter → value that explains the gap best.
+    explained
+        Explained share of the gap beyond noise and tolerances, 0 to 1.
+    probability
+        Probability among all effects tried, given that one of them is the cause; below 1.
     """
 
     effect: str
@@ -21,17 +28,26 @@ class Suspect:
 
     @property
     def component(self) -> str:
-        """Where it is."""
+        """Component of the effect."""
         return self.effect.partition("@")[2]
 
 
 @dataclass(frozen=True)
 class Alarm:
-    """A gap that noise and tolerances do not explain.
+    """Gap that noise and tolerances do not explain.
 
-    time: s, up to where the test was recorded when it was raised; since: s, about when the gap
-    began; signal: that shows it most; band: Hz, in which it does; suspects: the likeliest first,
-    empty before they were looked for.
+    Attributes
+    ----------
+    time
+        End of the recording when the alarm was raised, in s.
+    since
+        Estimated beginning of the gap, in s.
+    signal
+        Signal with the largest gap.
+    band
+        Frequency band of the gap, in Hz.
+    suspects
+        Suspected effects, the likeliest first; empty before an investigation.
     """
 
     time: float
@@ -42,8 +58,9 @@ class Alarm:
 
     @property
     def component(self) -> str:
-        """The likeliest place, by all suspects there together; empty before they were looked
-        for."""
+        """Component with the largest total probability of suspects; empty without suspects."""
+        # Effects of one component are often confounded; their component is more certain than each
+        # of them.
         places: dict[str, float] = {}
         for suspect in self.suspects:
             places[suspect.component] = places.get(suspect.component, 0.0) + suspect.probability
@@ -51,13 +68,13 @@ class Alarm:
 
     def __str__(self) -> str:
         low, high = self.band
-        said = (
+        sentence = (
             f"alarm at {self.time:.2f} s: since about {self.since:.2f} s {self.signal} is off by "
             f"more than noise and tolerances explain, most at {low:g} to {high:g} Hz"
         )
         if not self.suspects:
-            return said
+            return sentence
         named = ", ".join(
             f"{suspect.effect} ({100.0 * suspect.probability:.0f} %)" for suspect in self.suspects
         )
-        return f"{said}; at {self.component}: {named}"
+        return f"{sentence}; at {self.component}: {named}"

@@ -1,7 +1,7 @@
-"""A one-sided CUSUM of a variance: when has a signal more power than it should have?
+"""One-sided CUSUM test of a variance: detects when a signal has more power than expected.
 
-Page's test (Biometrika 41, 1954) on the logarithm of the likelihood ratio of two normal
-distributions, of the variance that is explained and of `RATIO` times as much. Its mean time to a
+Page's test (Biometrika 41, 1954) adds up the logarithm of the likelihood ratio of two normal
+distributions: of the expected variance, and of `RATIO` times that variance. The mean time to a
 false alarm is at least exp(limit) blocks (Lorden, Ann. Math. Stat. 42, 1971).
 """
 
@@ -10,35 +10,37 @@ from __future__ import annotations
 import math
 
 RATIO = 2.0
-"""Times the power that is explained: what the test is made for. It adds up from 1.39 times on."""
+"""Variance ratio that the test is designed for. The sum grows for ratios above 1.39."""
 
 
 class Cusum:
-    """One of them. value: 0 or above; since: time at which it last was 0, s."""
+    """State of a test: its value, at least 0, and the time, in s, at which it last was 0."""
 
     def __init__(self, start: float) -> None:
-        """start: s."""
+        """Start a test at a time in s."""
         self.value, self.since = 0.0, start
 
     def add(self, power: float, count: float, time: float) -> float:
-        """Takes a block.
+        """Add a block.
 
         Parameters
         ----------
         power
-            Sum of `count` squares, each of mean 1 or less if nothing is wrong.
+            Sum of `count` squares, each of mean 1 or less without a fault.
         count
-            Independent ones among them, need not be whole.
+            Number of independent squares in the sum; not necessarily whole.
         time
-            s, at the block's end.
+            End of the block, in s.
 
         Returns
         -------
         float
-            The value with it.
+            Value after the block.
         """
+        # log p₁/p₀ of n normal squares with variances 1 and R: ½ (1 − 1/R) Σx² − ½ n log R.
         step = 0.5 * (1.0 - 1.0 / RATIO) * power - 0.5 * count * math.log(RATIO)
         self.value = max(self.value + step, 0.0)
+        # The last time at zero is the estimate of when the change began.
         if self.value == 0.0:
             self.since = time
         return self.value

@@ -1,4 +1,4 @@
-"""The gap over time: measured less predicted, in units of what noise and tolerances explain."""
+"""Gap over time: measured minus predicted, in units of what noise and tolerances explain."""
 
 from __future__ import annotations
 
@@ -14,19 +14,28 @@ from rigtwin.diagnosis.space import Space
 from rigtwin.numerics.arrays import Array
 
 BANDS = ((0.0, 2.0), (2.0, 8.0), (8.0, 30.0), (30.0, 150.0))
-"""Hz; a gap shows in one of them long before it shows in all."""
+"""Frequency bands in Hz. A gap shows in one band long before it shows in the total."""
 CLEAR = 2.0
-"""Standard deviations of what noise leaves, beyond which tolerances are asked."""
+"""Number of standard deviations above the noise level from which tolerances are subtracted."""
 
 
 @dataclass(frozen=True)
-class Gap:
-    """Of one stretch of a test.
+class GapTrace:
+    """Gap over a stretch of a test.
 
-    time: s, shape (ticks,); measured, predicted: shape (signals, ticks); power: of the whitened
-    difference less what tolerances take up, in each band, of mean 1 or less if nothing is wrong,
-    shape (signals, bands, ticks); counts: ticks that are judged, shape (signals, ticks); freedom:
-    independent squares a tick, shape (signals, bands).
+    Attributes
+    ----------
+    time
+        Times in s, shape (ticks,).
+    measured, predicted
+        Signals, shape (signals, ticks).
+    power
+        Power of the whitened residual after subtraction of tolerances, with mean 1 or less without
+        a fault, shape (signals, bands, ticks).
+    counts
+        Ticks that are judged, shape (signals, ticks).
+    freedom
+        Independent squares per tick, shape (signals, bands).
     """
 
     time: Array
@@ -37,29 +46,30 @@ class Gap:
     freedom: Array
 
 
-def find_gap(evidence: Evidence) -> Gap:
-    """The gap of one recording.
+def find_gap(evidence: Evidence) -> GapTrace:
+    """Return the gap of one recording.
 
     Parameters
     ----------
     evidence
-        Of that recording alone, about the twin that it is held against.
+        Evidence of that recording alone, about the twin it is compared with.
 
     Returns
     -------
-    Gap
-        Of all its ticks.
+    GapTrace
+        Gap at all ticks of the recording.
     """
     lines = evidence.lines[0]
     predicted = evidence.predict(evidence.plant)[0]
     residual = evidence.residual_of([predicted])
     freedom, counts = _freedom(lines), lines.fade > 0.5
     power = _powers(lines, residual)
+    # Subtracting tolerances needs many predictions, so it is done only if noise cannot explain it.
     if evidence.machine.tolerances and _is_large(power, counts, freedom):
         residual = Space(evidence, evidence.plant).subtract_tolerances(residual)
         power = _powers(lines, residual)
     time = float(evidence.recordings[0].time[0])
-    return Gap(
+    return GapTrace(
         time=time + lines.period * np.arange(lines.measured.shape[1]),
         measured=lines.measured,
         predicted=predicted,
@@ -70,52 +80,55 @@ def find_gap(evidence: Evidence) -> Gap:
 
 
 def _is_large(power: Array, counts: NDArray[np.bool_], freedom: Array) -> bool:
-    """Whether any signal has more power in a band than noise alone may leave it, so that what
-    tolerances take up matters."""
-    found = np.sum(np.where(counts[:, None], power, 0.0), axis=2)
+    """Return whether any signal has more power in a band than noise alone may cause."""
+    observed = np.sum(np.where(counts[:, None], power, 0.0), axis=2)
     expected = freedom * counts.sum(axis=1)[:, None]
+    # A sum of n squares of unit normals has variance 2 n.
     spread = np.sqrt(2.0 * expected)
-    return bool(np.any(found > expected + CLEAR * spread))
+    return bool(np.any(observed > expected + CLEAR * spread))
 
 
 def _in_bands(lines: Lines) -> NDArray[np.bool_]:
-    """Which lines lie in which band, shape (bands, lines)."""
+    """Return which spectral lines lie in which band, shape (bands, lines)."""
     return np.array([(lines.frequency >= low) & (lines.frequency < high) for low, high in BANDS])
 
 
 def _powers(lines: Lines, residual: Array) -> Array:
-    """Power over time of what a whitened residual has in each band."""
+    """Return the power over time of a whitened residual in each band.
+
+    The spectrum is cut into bands, and each band is transformed back to a signal over time.
+    """
     rows, ticks = lines.measured.shape
     real, imaginary = residual.reshape(2, rows, len(lines.frequency))
     whole = np.zeros((rows, len(BANDS), lines.length // 2 + 1), complex)
     whole[:, :, : real.shape[1]] = (real + 1j * imaginary)[:, None, :] * _in_bands(lines)
-    # Parts of a line have variance 1 if all ticks that count are taken together.
+    # Real and imaginary parts of a line have variance 1 only if all ticks count.
     share = np.sum(lines.fade**2, axis=1) / lines.length
     traces = irfft(whole, lines.length, axis=2)[:, :, :ticks]
     return traces**2 * (0.5 * lines.length * share)[:, None, None]
 
 
 def _freedom(lines: Lines) -> Array:
-    """Independent squares a tick: two a line that is there, spread over all ticks."""
-    kept = _in_bands(lines)[None] & (lines.weight > 0.0)[:, None, :]
-    return 2.0 * kept.sum(axis=2) / lines.length
+    """Return the independent squares per tick: two per spectral line, spread over all ticks."""
+    present = _in_bands(lines)[None] & (lines.weight > 0.0)[:, None, :]
+    return 2.0 * present.sum(axis=2) / lines.length
 
 
-def ratio(gap: Gap, ticks: slice) -> Array:
-    """Times what is explained, by signal, over a stretch: all bands together.
+def ratio(gap: GapTrace, ticks: slice) -> Array:
+    """Return the gap of each signal over a stretch, with all bands together.
 
     Parameters
     ----------
     gap
-        Of a stretch that holds it.
+        Gap of a recording that contains the stretch.
     ticks
-        The stretch.
+        Ticks of the stretch.
 
     Returns
     -------
     array
-        Root of the power in units of what noise and tolerances explain, shape (signals,); 0 where
-        nothing is judged.
+        RMS in units of what noise and tolerances explain, shape (signals,); 0 if nothing is
+        judged.
     """
     counts = gap.counts[:, ticks]
     power = np.sum(np.where(counts, gap.power[:, :, ticks].sum(axis=1), 0.0), axis=1)

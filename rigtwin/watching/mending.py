@@ -1,4 +1,4 @@
-"""A recording with ticks missing: a session in real time leaves out those that it missed."""
+"""Recordings with missing ticks, which a session in real time leaves out when it is late."""
 
 from __future__ import annotations
 
@@ -11,28 +11,30 @@ from numpy.typing import NDArray
 from rigtwin.recording import Recording
 
 LONGEST = 0.05
-"""s that may be filled in; the machine went on with the commands that it had."""
+"""Longest gap that is filled in, in s. During it the machine kept its last commands."""
 
 
 def mend(recording: Recording) -> tuple[Recording, NDArray[np.bool_]]:
-    """Fills in what is missing.
+    """Fill in missing ticks.
 
     Parameters
     ----------
     recording
-        Of which ticks may be missing.
+        Recording in which ticks may be missing.
 
     Returns
     -------
     tuple of Recording and array
-        Without ticks missing, from its last long gap on; and which of its ticks were recorded,
-        shape (ticks,). Of others, commands are those before and signals lie on a line.
+        Recording after its last long gap, without missing ticks, and whether each tick was
+        recorded, shape (ticks,). In filled ticks, commands are held and signals interpolated.
     """
     steps = np.diff(recording.time)
+    # Nobody knows what the machine did in a long gap; only what follows is used.
     long = np.flatnonzero(np.abs(steps) > LONGEST)
     if len(long):
         recording = recording.between(float(recording.time[long[-1] + 1]), math.inf)
         steps = np.diff(recording.time)
+    # Steps are rounded to whole periods; each step moves on by at least one tick.
     places = np.concatenate([[0], np.cumsum(np.maximum(np.rint(steps / recording.period), 1.0))])
     places = places.astype(int)
     ticks = np.arange(places[-1] + 1)
@@ -40,6 +42,7 @@ def mend(recording: Recording) -> tuple[Recording, NDArray[np.bool_]]:
     recorded[places] = True
     if recorded.all():
         return recording, recorded
+    # The last recorded tick at or before each tick.
     before = np.searchsorted(places, ticks, side="right") - 1
     columns = {
         topic: {

@@ -1,4 +1,4 @@
-"""Which effect may be behind a gap: a first look, each effect alone."""
+"""Suspects of a gap: a quick search in which each effect is tried alone."""
 
 from __future__ import annotations
 
@@ -13,55 +13,58 @@ from rigtwin.diagnosis.thresholds import STANDARD, Thresholds
 from rigtwin.watching.alarm import Suspect
 
 FITTED = 12
-"""Effects that are fitted, those that promise most."""
+"""Number of effects that are fitted, the most promising ones."""
 NAMED = 4
-"""Suspects at most."""
+"""Maximum number of suspects."""
 TEMPERED = 0.05
-"""Share of the rest by which differences of the misfit count less."""
+"""Tempering of the misfit, as a share of the remaining misfit."""
 WORTH = 0.02
-"""Probability from which one is named."""
+"""Smallest probability of a suspect."""
 
 
 def find_suspects(evidence: Evidence, thresholds: Thresholds = STANDARD) -> tuple[Suspect, ...]:
-    """What may be behind a gap, if it is one effect of the library.
+    """Return the effects that may cause a gap, if the cause is one effect of the library.
 
     Parameters
     ----------
     evidence
-        With the ticks that show the gap counted, about the twin that they are held against.
+        Evidence in which only the ticks of the gap count.
     thresholds
-        What figures are held against.
+        Thresholds of the diagnosis.
 
     Returns
     -------
     tuple of Suspect
-        The likeliest first; none if nothing explains any of it.
+        Suspects, the likeliest first; empty if no effect explains any of the gap.
     """
+    # Accuracy is traded for speed: the test is still running.
     searched = evidence.thin().halve_steps()
-    # Twice the nats that an effect must gain where noise alone is left, as chi-square.
+    # An effect must lower χ² by twice the nats of its prior, as where only noise remains.
     price = 2.0 * (thresholds.occam_quiet + thresholds.materiality * evidence.expected)
     fitter, least = Fitter(searched), price
-    nothing = fitter.nothing
+    without = fitter.nothing
     with Threads() as threads:
         screened = threads.map(fitter.screen, candidates(evidence))
-        screened.sort(key=lambda each: -each.promise)
-        promising = [each for each in screened[:FITTED] if each.promise >= least]
+        screened.sort(key=lambda candidate: -candidate.promise)
+        promising = [candidate for candidate in screened[:FITTED] if candidate.promise >= least]
         tried = threads.map(fitter.fit_one, promising)
-    found = [fit for fit in tried if fit.misfit + least < nothing.misfit]
-    if not found:
+    fits = [fit for fit in tried if fit.misfit + least < without.misfit]
+    if not fits:
         return ()
-    costs = np.array([fit.misfit for fit in found])
-    left = max(min(fit.misfit for fit in found) - evidence.expected, 0.0)
-    temper = thresholds.temper + TEMPERED * left
+    costs = np.array([fit.misfit for fit in fits])
+    # A misfit that even the best fit leaves means that the model is wrong; then differences of the
+    # misfit prove less, and the weights exp(−χ²/2) are tempered.
+    remaining = max(min(fit.misfit for fit in fits) - evidence.expected, 0.0)
+    temper = thresholds.temper + TEMPERED * remaining
     weights = np.exp(-np.minimum((costs - costs.min()) / (2.0 * temper), 700.0))
     weights /= weights.sum()
-    gap = max(nothing.misfit - evidence.expected, 1e-300)
+    gap = max(without.misfit - evidence.expected, 1e-300)
     suspects = [
-        _suspect(fit, (nothing.misfit - fit.misfit) / gap, thresholds.sure * float(weight))
-        for fit, weight in zip(found, weights, strict=True)
+        _suspect(fit, (without.misfit - fit.misfit) / gap, thresholds.sure * float(weight))
+        for fit, weight in zip(fits, weights, strict=True)
     ]
-    suspects.sort(key=lambda each: -each.probability)
-    return tuple(each for each in suspects[:NAMED] if each.probability >= WORTH)
+    suspects.sort(key=lambda suspect: -suspect.probability)
+    return tuple(suspect for suspect in suspects[:NAMED] if suspect.probability >= WORTH)
 
 
 def _suspect(fit: Fit, explained: float, probability: float) -> Suspect:

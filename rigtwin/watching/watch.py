@@ -1,4 +1,4 @@
-"""Holds a test that is running against its twin, stretch by stretch."""
+"""Watch: compares a running test with its twin, stretch by stretch."""
 
 from __future__ import annotations
 
@@ -17,60 +17,72 @@ from rigtwin.recording import Recording
 from rigtwin.signals.noise import white_noise
 from rigtwin.watching.alarm import Alarm
 from rigtwin.watching.cusum import Cusum
-from rigtwin.watching.gap import BANDS, Gap, find_gap, ratio
+from rigtwin.watching.gap import BANDS, GapTrace, find_gap, ratio
 from rigtwin.watching.mending import mend
 from rigtwin.watching.suspects import find_suspects
 
 WINDOW = 20.0
-"""s of a test that are predicted anew each time."""
+"""Length of the window that is predicted anew each time, in s."""
 WARM = 4.0
-"""s at a window's beginning that are not judged: a twin must first forget where it started. Of a
-session that has just ramped to its test, nobody knows exactly where dry friction holds the rig."""
+"""Time at a window's start that is not judged, in s, because the twin must first forget its initial
+state. Where dry friction holds the rig after the ramp to a test is not exactly known."""
 SHORTEST = 2.0
-"""s from which a test is judged."""
+"""Length from which a test is judged, in s."""
 STEP = 0.5
-"""s from one time to the next."""
+"""Time between two judgements, in s."""
 BLOCK = 0.25
-"""s that are judged at a time."""
+"""Length of a block of the CUSUM, in s."""
 HELD_BACK = 0.25
-"""s at a window's end that are judged next time, where signals are limited to a band: a filter
-knows them only once it knows what follows."""
+"""Time at a window's end that is left to the next judgement, in s, if signals are limited to a
+band: the filter needs what follows."""
 LIMIT = 20.0
-"""Of each CUSUM. Were blocks independent and normal, one would exceed it by chance once in
+"""Limit of each CUSUM. If blocks were independent and normal, one would exceed it by chance once in
 exp(20) blocks, which is four thousand years."""
 KICK = 0.5
-"""Share of themselves by which commands are changed at a window's beginning, to see whether the
-twin forgets it."""
+"""Relative change of the commands at a window's start, which tests whether the twin forgets its
+initial state."""
 SAME = 0.5
-"""Of what a signal is held to, by which such predictions may differ."""
+"""Allowed difference of such predictions, relative to the accuracy a signal is compared with."""
 STEPS = 4
-"""Of integration a tick."""
+"""Number of integration steps per tick."""
 SEEN = 3.0
-"""s of a gap that must be seen until its suspects are looked for."""
+"""Length of a gap from which suspects are searched, in s."""
 SETTLED = 1.0
-"""s of a gap that its suspects are not held against: they were not there before it."""
+"""Length at a gap's beginning that suspects are not fitted to, in s: its onset is uncertain."""
 LOOKED = 1.5
-"""Times as long as before a gap must be seen until its suspects are looked for again."""
+"""Factor by which a gap must have grown before suspects are searched again."""
 
 
 class Watch:
-    """A twin beside a test. It is given what was recorded so far, again and again.
+    """Comparison of a test with its twin, which is updated with what was recorded so far.
 
-    alarm: the gap that was found, None so far; gap, recording: what was judged last and what it is
-    of, None before there was enough; ratios: by signal, the difference's rms in the last stretch in
-    units of what noise and tolerances explain; note: why the last stretch could not be judged,
-    empty if it was; judged: s, up to where; seconds: s up to there in which something
-    could be judged; highest: the level's maximum so far.
+    Attributes
+    ----------
+    alarm
+        Gap that was detected; None so far.
+    gap, recording
+        Last judged stretch and its recording; None until there is enough.
+    ratios
+        RMS of each signal's residual in the last stretch, in units of what noise and tolerances
+        explain.
+    note
+        Why the last stretch could not be judged; empty if it was.
+    judged
+        Time up to which the test is judged, in s.
+    seconds
+        Total time in which something could be judged, in s.
+    highest
+        Maximum of the level so far.
     """
 
     def __init__(self, machine: Machine, base: Configuration | None = None) -> None:
-        """base: the twin, by default the described one."""
+        """Watch a test of a machine. `base` is the twin; it defaults to the described one."""
         self.machine = machine
         self._base = base
         self._cusums: list[list[Cusum]] = []
         self._start, self._looked = math.nan, 0.0
         self.alarm: Alarm | None = None
-        self.gap: Gap | None = None
+        self.gap: GapTrace | None = None
         self.ratios: dict[str, float] = {}
         self.note, self.judged = "", -math.inf
         self.recording: Recording | None = None
@@ -78,23 +90,23 @@ class Watch:
 
     @property
     def level(self) -> float:
-        """How near an alarm is: the largest CUSUM in units of its limit."""
-        return max((each.value for row in self._cusums for each in row), default=0.0) / LIMIT
+        """Distance to an alarm: the largest CUSUM in units of its limit."""
+        return max((cusum.value for row in self._cusums for cusum in row), default=0.0) / LIMIT
 
     def take(self, recording: Recording, *, last: bool = False) -> bool:
-        """Judges what is new of a test.
+        """Judge what is new of a test.
 
         Parameters
         ----------
         recording
-            What there is of it: its last `WINDOW` seconds, or all.
+            Recording so far: its last `WINDOW` seconds, or all.
         last
-            Whether nothing will follow.
+            Whether the test has ended.
 
         Returns
         -------
         bool
-            Whether there was enough that is new.
+            Whether enough was new to be judged.
 
         Raises
         ------
@@ -117,6 +129,7 @@ class Watch:
         self.note = ""
         self.recording, self.gap = window, find_gap(evidence)
         gap = self.gap
+        # At the end of a test nothing follows, so everything is judged.
         held = 0.0 if last or math.isinf(evidence.models[0].band) else HELD_BACK
         first, stop = np.searchsorted(gap.time, [self.judged, end - held])
         new = slice(int(first), max(int(stop), int(first)))
@@ -125,25 +138,31 @@ class Watch:
         names = evidence.names
         self.ratios = dict(zip(names, ratio(gap, new).tolist(), strict=True))
         self._judge(gap, new, names, end)
+        # The share of ticks at which at least one signal was judged.
         seen = float(np.mean(gap.counts[:, new].any(axis=0)))
-        here = float(gap.time[new.stop - 1]) + evidence.lines[0].period
-        self.seconds += seen * (here - self.judged)
-        self.judged = here
+        until = float(gap.time[new.stop - 1]) + evidence.lines[0].period
+        self.seconds += seen * (until - self.judged)
+        self.judged = until
         self.highest = max(self.highest, self.level)
         return True
 
     def _evidence(self, window: Recording, counts: NDArray[np.bool_]) -> Evidence:
-        """counts: ticks that do, if the twin has forgotten where it started."""
+        """Return the evidence of a window; only the given ticks count, once the twin is settled."""
         configuration = self.machine.configuration_of(window, self._base)
         require_fit(self.machine, window, configuration)
         counted = counts.astype(float)
+        # A test that began at rest without a ramp starts as the twin does; nothing needs to be
+        # forgotten.
         if window.transitions or window.time[0] > self._start + 0.5 * window.period:
             counted[~self._has_forgotten(window, configuration)] = 0.0
         return Evidence(self.machine, [window], [configuration], [counted])
 
     def _has_forgotten(self, window: Recording, configuration: Configuration) -> NDArray[np.bool_]:
-        """Ticks at which it makes no difference how the twin started, shape (ticks,): what stands
-        still keeps where dry friction holds it."""
+        """Return the ticks whose prediction does not depend on the initial state, shape (ticks,).
+
+        The commands at the window's start are changed, and the predictions compared. They never
+        converge where dry friction holds a joint that stands still.
+        """
         known = window.time >= window.time[0] + WARM
         plant = configuration.plant
         model = self.machine.physics.model(self.machine, window.inputs, configuration, STEPS)
@@ -157,13 +176,15 @@ class Watch:
             kicked = self.machine.physics.model(
                 self.machine, _kick(window, share).inputs, configuration, STEPS
             )
+            # A diverged twin predicts infinities, whose difference is NaN and never converges.
             with np.errstate(invalid="ignore"):
-                apart = np.abs(kicked.predict(plant) - predicted)
-            alike = np.all(apart <= SAME * np.array(held)[:, None], axis=0)
-            known &= np.repeat(alike, model.every)[: window.ticks]
+                difference = np.abs(kicked.predict(plant) - predicted)
+            converged = np.all(difference <= SAME * np.array(held)[:, None], axis=0)
+            known &= np.repeat(converged, model.every)[: window.ticks]
         return known
 
-    def _judge(self, gap: Gap, new: slice, names: list[str], end: float) -> None:
+    def _judge(self, gap: GapTrace, new: slice, names: list[str], end: float) -> None:
+        """Add the new stretch to the CUSUMs, and raise the alarm if one exceeds its limit."""
         period = float(gap.time[1] - gap.time[0])
         length = max(1, round(BLOCK / period))
         for start in range(new.start, new.stop, length):
@@ -178,23 +199,25 @@ class Watch:
                     power = float(np.sum(gap.power[row, number, block][counts]))
                     if freedom > 0.0:
                         cusum.add(power, freedom, time)
+                    # Only the first alarm is raised; later ones would be consequences of the same
+                    # gap.
                     if self.alarm is None and cusum.value >= LIMIT:
                         self.alarm = Alarm(end, cusum.since, name, BANDS[number])
 
     def investigate(self, recording: Recording, *, last: bool = False) -> bool:
-        """Looks for what may be behind an alarm: at once, and again as more of the gap was seen.
+        """Search for suspects of an alarm, at once and again as the gap grows.
 
         Parameters
         ----------
         recording
-            What `take` judged last.
+            Recording that `take` judged last.
         last
-            Whether nothing will follow.
+            Whether the test has ended.
 
         Returns
         -------
         bool
-            Whether it looked. It takes seconds.
+            Whether suspects were searched, which takes seconds.
         """
         if self.alarm is None:
             return False
@@ -203,9 +226,11 @@ class Watch:
         seen = self.judged - since
         if seen < max(SEEN, LOOKED * self._looked) and not (last and not self._looked):
             return False
+        # A gap older than the window adds no new evidence.
         if self._looked and seen > WINDOW - WARM - STEP:
             return False
         self._looked = seen
+        # The twin needs the time before the gap to settle.
         part = window.between(since - WARM, math.inf)
         from_here = part.time >= (since + SETTLED if since > self._start else since)
         try:
@@ -218,7 +243,8 @@ class Watch:
 
 
 def _kick(window: Recording, share: float) -> Recording:
-    """A recording whose first commands are greater by a share of themselves."""
+    """Return a recording whose first commands are enlarged by a share of themselves."""
+
     ticks = round(0.25 * WARM / window.period)
     commands = {}
     for name, values in window.columns.get("/command", {}).items():

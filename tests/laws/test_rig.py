@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 import pytest
-from rigtwin.diagnosis.component import replay_carriage, replay_motor
 
 from rigtwin.components import Carriage, Motor, Rail, RigPlant, Tyre
 from rigtwin.description.configuration import Configuration
+from rigtwin.rig.component import replay_carriage, replay_motor
 from tests.laws.written import law_of
 
 PERIOD = 1e-3

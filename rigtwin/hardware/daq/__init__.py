@@ -1,9 +1,6 @@
-"""The rig behind a data acquisition card.
-
-Which signal is on which line, volts, the card itself, and a virtual one.
-"""
+"""Connection of a rig to a data acquisition card: channel table, conversion, card, virtual card."""
 
 from pathlib import Path
 
 CARD = Path(__file__).parents[3] / "machines" / "cards" / "pci-6229.toml"
-"""The packaged channel table."""
+"""Path of the channel table that is shipped with the package."""

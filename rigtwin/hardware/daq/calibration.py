@@ -1,7 +1,4 @@
-"""Finds out what a channel table must say: zero, span, and which way each signal goes.
-
-Writes it down with date and name.
-"""
+"""Calibration of a channel table: zero, span and sign of each signal, with date and operator."""
 
 from __future__ import annotations
 
@@ -16,21 +13,31 @@ from controllers.force import MOTOR_CONSTANT
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.settings import Timing
 from rigtwin.errors import RigtwinError
-from rigtwin.hardware.daq.table import ChannelTable, Line
+from rigtwin.hardware.daq.table import CardLine, ChannelTable
 from rigtwin.numerics.arrays import Array
 from rigtwin.simulation.rig import DrivenRig
 
-LOOKED = 2000
-"""Ticks that a zero or a span is averaged over: many periods of the mains."""
+REST_TICKS = 2000
+"""Ticks averaged for a zero or a span; they cover many mains periods, whose hum cancels."""
 BUMP = 1.0
-"""s that each output takes to go out and back."""
+"""Duration of one output's motion out and back, in s."""
 STEADY = 5.0
-"""Standard errors by which a response must stand out before its direction is believed."""
+"""Number of standard errors a response must reach before its direction is accepted."""
 
 
 @dataclass(frozen=True)
-class Still:
-    """A signal at rest. mean, noise: in its unit; repeats: most same readings in a row."""
+class RestReading:
+    """Readings of one signal at rest.
+
+    Attributes
+    ----------
+    name
+        Name of the signal.
+    mean, noise
+        Mean and standard deviation, in the signal's unit.
+    repeats
+        Largest number of equal readings in a row.
+    """
 
     name: str
     mean: float
@@ -38,41 +45,53 @@ class Still:
     repeats: int
 
 
-def measure_rest(rig: DrivenRig, ticks: int = LOOKED) -> tuple[Still, ...]:
-    """Every input while nothing moves.
+def measure_rest(rig: DrivenRig, ticks: int = REST_TICKS) -> tuple[RestReading, ...]:
+    """Measure every input while nothing moves.
 
-    The rig must have been started; no output is written. Raises RigtwinError.
+    Parameters
+    ----------
+    rig : DrivenRig
+        Rig that has been started. No output is written.
+    ticks : int
+        Number of readings.
+
+    Raises
+    ------
+    RigtwinError
+        If the rig cannot be read.
     """
     values = np.array([rig.read() for _ in range(ticks)])
     return tuple(
-        Still(name, float(np.mean(column)), float(np.std(column)), _count_repeats(column))
+        RestReading(name, float(np.mean(column)), float(np.std(column)), _count_repeats(column))
         for name, column in zip(Measurements._fields, values.T, strict=True)
     )
 
 
 def _count_repeats(column: Array) -> int:
+    """Return the length of the longest run of equal values."""
+    # A run ends where the value changes; both ends of the record count as changes.
     changes = np.flatnonzero(np.diff(column) != 0.0)
     return int(np.max(np.diff(np.concatenate(([-1], changes, [len(column) - 1])))))
 
 
 def set_zeros(
-    table: ChannelTable, still: tuple[Still, ...], references: Mapping[str, float]
+    table: ChannelTable, still: tuple[RestReading, ...], references: Mapping[str, float]
 ) -> ChannelTable:
-    """Sets the inputs' zeros.
+    """Set the zeros of the inputs.
 
     Parameters
     ----------
     table : ChannelTable
-        As it was.
-    still : tuple of Still
-        The inputs as the rig now stands.
+        Table before the calibration.
+    still : tuple of RestReading
+        Readings of the inputs at rest.
     references : mapping
-        Input → what it is to read, in its unit; zero where none is given.
+        Input → reference value, in its unit. Inputs without an entry are to read zero.
 
     Returns
     -------
     ChannelTable
-        With other offsets.
+        Table with new offsets.
     """
     lines = [
         _rescale(line, offset=line.scaling.offset - signal.mean + references.get(line.name, 0.0))
@@ -82,26 +101,40 @@ def set_zeros(
 
 
 def set_spans(
-    table: ChannelTable, still: tuple[Still, ...], references: Mapping[str, float]
+    table: ChannelTable, still: tuple[RestReading, ...], references: Mapping[str, float]
 ) -> ChannelTable:
-    """Sets the spans of inputs that read true at zero, by their references as the rig now stands.
+    """Set the spans of inputs whose zeros are right.
 
-    Raises RigtwinError for a reference too close to zero.
+    Parameters
+    ----------
+    table : ChannelTable
+        Table before the calibration.
+    still : tuple of RestReading
+        Readings of the inputs with the rig at the references.
+    references : mapping
+        Input → reference value, in its unit.
+
+    Raises
+    ------
+    RigtwinError
+        If a reference is too close to zero, or the reading has the opposite sign.
     """
     lines = []
     for line, signal in zip(table.inputs, still, strict=True):
         if line.name in references:
-            # What an offset makes of the reading is no part of the span.
+            # value = factor · volts + offset: the span scales only the part without the offset.
             moved, wanted = (
                 signal.mean - line.scaling.offset,
                 references[line.name] - line.scaling.offset,
             )
+            # Near zero the span is a quotient of two small numbers.
             if abs(moved) < 10.0 * signal.noise:
                 raise RigtwinError(
                     f"span of {line.name}: it reads {signal.mean:.4g} {line.unit}, which is noise; "
                     "place it at its reference"
                 )
             factor = wanted / moved
+            # A negative factor would be a wrong sign hidden in the scale.
             if factor <= 0.0:
                 raise RigtwinError(
                     f"span of {line.name}: it reads {signal.mean:.4g} {line.unit}, the wrong way; "
@@ -112,21 +145,36 @@ def set_spans(
     return replace(table, inputs=tuple(lines))
 
 
-def _rescale(line: Line, **changes: float) -> Line:
+def _rescale(line: CardLine, **changes: float) -> CardLine:
     return line._replace(scaling=line.scaling._replace(**changes))
 
 
 def plan_bumps(stroke: float, force: float, period: float) -> tuple[Configuration, Array]:
-    """A session that moves one output after the other a little and back.
+    """Plan a session that moves one output after another a little and back.
 
-    The ground and the structure by `stroke`, m, then the motor by `force`, N, without feedback.
-    Returns configuration and demands, shape (ticks, 3).
+    The outputs move without feedback: the force loop has only its feedforward gain.
+
+    Parameters
+    ----------
+    stroke
+        Motion of ground and structure, in m.
+    force
+        Force of the motor, in N.
+    period
+        Period of a tick, in s.
+
+    Returns
+    -------
+    tuple of Configuration and Array
+        Configuration of the session, and its demands, shape (ticks, 3).
     """
     ticks = round(BUMP / period)
+    # A raised cosine starts and ends without a jump in velocity.
     bump = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(ticks) / ticks)
     demands = np.zeros((3 * ticks, 3))
     for column, height in enumerate((stroke, stroke, force)):
         demands[column * ticks : (column + 1) * ticks, column] = height * bump
+    # Imposed motion with feedforward only: no loop can react to a sign that is wrong.
     settings = Settings(mode=Mode.IMPOSED, kp=0.0, ki=0.0, kff=1.0, preload=0.0, start=0.0)
     return Configuration(
         controller=settings, timing=Timing(duration=3 * BUMP, period=period)
@@ -134,61 +182,81 @@ def plan_bumps(stroke: float, force: float, period: float) -> tuple[Configuratio
 
 
 def fit_responses(measured: Array, demands: Array) -> dict[str, tuple[str, float, float]]:
-    """Fits how the inputs answer the outputs in a session of `plan_bumps`.
+    """Fit the gain of each input on its output in a session of `plan_bumps`.
 
     Parameters
     ----------
     measured : Array
-        Columns of controllers.Measurements, shape (ticks, 4).
+        Measurements, shape (ticks, 4), in the order of `controllers.Measurements`.
     demands : Array
-        Of that session, shape (ticks, 3).
+        Demands of the session, shape (ticks, 3).
 
     Returns
     -------
     dict
-        Output → input that must follow it, its gain on the demand, the gain's standard error.
+        Output → the input that follows it, the gain, and the standard error of the gain.
     """
     ticks = len(demands) // 3
-    found: dict[str, tuple[str, float, float]] = {}
+    responses: dict[str, tuple[str, float, float]] = {}
     for column, (output, sensor) in enumerate(FOLLOWS.items()):
         stretch = slice(column * ticks, (column + 1) * ticks)
         gain, error = _fit_gain(
             demands[stretch, column], measured[stretch, Measurements._fields.index(sensor)]
         )
-        found[output] = (sensor, gain, error)
+        responses[output] = (sensor, gain, error)
+    # The rail's friction holds the carriage, so the travel follows the structure's motion.
     stretch = slice(ticks, 2 * ticks)
     gain, error = _fit_gain(
         demands[stretch, 1], measured[stretch, Measurements._fields.index("suspension_lvdt")]
     )
-    found["travel"] = ("suspension_lvdt", gain, error)
-    return found
+    responses["travel"] = ("suspension_lvdt", gain, error)
+    return responses
 
 
 FOLLOWS = {"ground": "ground_lvdt", "structure": "structure_lvdt", "voltage": "load_cell"}
-"""Which input each output moves; the suspension's travel follows the structure while the rail
-holds the carriage."""
+"""Output → input that it moves. The travel follows the structure too, while the rail holds the
+carriage."""
 
 
 def _fit_gain(asked: Array, read: Array) -> tuple[float, float]:
-    """Least squares of `read` on `asked` and a constant."""
+    """Return the least-squares gain of `read` on `asked` and a constant, and its standard error."""
     design = np.column_stack([asked, np.ones(len(asked))])
     solution, residual, *_ = np.linalg.lstsq(design, read, rcond=None)
+    # Standard error of a slope: σ / ‖asked − mean‖, with two parameters fitted.
     spread = float(np.sqrt(residual[0] / (len(read) - 2))) if len(residual) else 0.0
     return float(solution[0]), spread / float(np.linalg.norm(asked - asked.mean()))
 
 
 def correct_signs(
-    table: ChannelTable, found: Mapping[str, tuple[str, float, float]], moved: Mapping[str, int]
+    table: ChannelTable, responses: Mapping[str, tuple[str, float, float]], moved: Mapping[str, int]
 ) -> tuple[ChannelTable, tuple[str, ...]]:
-    """The table with every sign as it must be, all of them checked, and what was changed.
+    """Correct the sign of every signal, and mark all signs as checked.
 
-    moved: output → 1 if the operator saw it go the way of its command's sign, else −1; the
-    voltage's is that of the force on the plate. Raises RigtwinError where a signal hardly answers.
+    Parameters
+    ----------
+    table
+        Table before the check.
+    responses
+        Result of `fit_responses`.
+    moved
+        Output → 1 if the operator saw it move in the direction of its command's sign, else −1.
+        For the voltage it is the direction of the force on the plate.
+
+    Returns
+    -------
+    tuple of ChannelTable and texts
+        Corrected table, and a line for each correction.
+
+    Raises
+    ------
+    RigtwinError
+        If a signal hardly responds.
     """
     inputs = {line.name: line for line in table.inputs}
     outputs = {line.name: line for line in table.outputs}
     said: list[str] = []
-    for output, (sensor, gain, error) in found.items():
+    for output, (sensor, gain, error) in responses.items():
+        # A gain is about 1 or −1 for a calibrated span; below 0.2 its sign means nothing.
         if abs(gain) < max(0.2, STEADY * error):
             raise RigtwinError(
                 f"sign of {sensor}: it hardly answers (gain {gain:.2g} ± {error:.1g}); "
@@ -201,6 +269,7 @@ def correct_signs(
                 outputs[output] = _turn_sign(outputs[output])
                 said.append(f"{output}: output went the wrong way; its sign is turned")
             outputs[output] = outputs[output]._replace(sign_checked=True)
+        # The operator sees the true motion, whose sign the input must have.
         if np.sign(gain) != went:
             inputs[sensor] = _turn_sign(inputs[sensor])
             said.append(f"{sensor}: reads the wrong way; its sign is turned")
@@ -209,14 +278,15 @@ def correct_signs(
     return turned, tuple(said)
 
 
-def _turn_sign(line: Line) -> Line:
-    """The other sign; what the offset makes of a reading turns with it."""
+def _turn_sign(line: CardLine) -> CardLine:
+    """Return the line with the opposite sign; the offset changes its sign with it."""
     return _rescale(line, sign=-line.scaling.sign, offset=-line.scaling.offset)
 
 
 def sign_off(table: ChannelTable, operator: str, note: str, today: date) -> ChannelTable:
+    """Return the table signed by an operator with date and note."""
     return replace(table, calibrated=today.isoformat(), operator=operator, note=note)
 
 
 FORCE = 0.4 * MOTOR_CONSTANT
-"""N of the motor's bump: more than both dry frictions hold."""
+"""Force of the motor's motion, in N; above the dry friction of motor and rail together."""

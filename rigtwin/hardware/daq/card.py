@@ -1,6 +1,6 @@
-"""A rig behind an NI card, through the nidaqmx package.
+"""A rig behind an NI card, accessed through the nidaqmx package.
 
-The driver of this computer, or a gRPC device server.
+The card is driven by this computer's driver or by a gRPC device server.
 """
 
 from __future__ import annotations
@@ -21,22 +21,22 @@ if TYPE_CHECKING:
     import grpc
 
 TIMEOUT = 0.1
-"""s that a sample may be awaited: a card that stays silent so long is not there."""
+"""Maximum time to wait for a sample, in s. A card that is silent for longer is considered gone."""
 DRIVER = (
     "install NI-DAQmx from ni.com, or name a gRPC device server in the channel table: card.address"
 )
 PACKAGE = "the nidaqmx package is missing; pip install 'rigtwin[daq]'"
 INPUTS, OUTPUTS, PRESSURE = "rigtwin-inputs", "rigtwin-outputs", "rigtwin-pressure"
-"""Names of the tasks, by which a guardian finds the outputs when their owner is dead."""
+"""Names of the tasks. A guardian finds the outputs by them after their owner has died."""
 
 
 class CardFault(RigtwinError):
-    """The card, its driver or the way to it does not do what it was asked."""
+    """Error for a card, driver or connection that does not do what it was asked."""
 
 
 @contextmanager
 def translate_errors(doing: str) -> Iterator[None]:
-    """Gives what nidaqmx raises as a CardFault of one line."""
+    """Raise errors of nidaqmx as a CardFault with a message of one line."""
     from nidaqmx.errors import DaqNotFoundError, DaqNotSupportedError, Error, RpcError
 
     try:
@@ -49,15 +49,15 @@ def translate_errors(doing: str) -> Iterator[None]:
         lines = [line.strip() for line in str(error).splitlines() if line.strip()]
         raise CardFault(f"{doing}: {' '.join(lines[:4])}") from None
     except (AssertionError, ValueError, TypeError) as error:
-        # The client's own checks of what a card has answered.
+        # nidaqmx raises these from its own checks of a card's answer.
         raise CardFault(
-            f"{doing}: it answered what the driver's client does not take: "
+            f"{doing}: unexpected answer of the card, which the driver's client rejects: "
             f"{error or type(error).__name__}"
         ) from None
 
 
 def require_client() -> None:
-    """Raises CardFault unless the driver's client is installed, with what a virtual card needs."""
+    """Raise CardFault unless the driver's client and the virtual card's packages are installed."""
     try:
         import grpc  # noqa: F401
         import nidaqmx  # noqa: F401
@@ -66,33 +66,41 @@ def require_client() -> None:
 
 
 def connect(address: str) -> grpc.Channel | None:
-    """The connection to a gRPC device server, or None for this computer's driver.
+    """Return the connection to a gRPC device server, or None for this computer's driver.
 
-    Raises CardFault.
+    Raises
+    ------
+    CardFault
+        If the client is not installed.
     """
     require_client()
     if not address:
         return None
     import grpc
 
-    # A server that is frozen, or a network that is gone, must be noticed: the client's calls have
-    # no end of their own.
+    # The client's calls have no timeout of their own. Keepalive pings end a call to a server that
+    # is frozen, or whose network is gone.
     alive = (
         ("grpc.keepalive_time_ms", 1000),
         ("grpc.keepalive_timeout_ms", 1000),
         ("grpc.http2.max_pings_without_data", 0),
     )
+    # The server is on the laboratory's own network; NI's server has no encryption by default.
     return grpc.insecure_channel(address, options=alive)
 
 
 class Card:
     """A `DrivenRig` on a card.
 
-    Inputs are clocked by the card where the table says so, else by this computer; outputs act at
-    once. Nothing moves before `write` or `pressure`.
+    Inputs are clocked by the card if the table says so, otherwise by this computer. Outputs act
+    immediately. Nothing moves before `write` or `power`.
 
-    missed: ticks whose samples came too late to be answered. late: s by which the last sample was
-    read after it was due.
+    Attributes
+    ----------
+    missed
+        Number of ticks whose samples came too late to be answered.
+    late
+        Delay of the last reading after its due time, in s.
     """
 
     def __init__(
@@ -103,13 +111,23 @@ class Card:
         clock: Callable[[], float] = monotonic,
         pacer: Pacer | None = None,
     ) -> None:
-        """period in s.
+        """Prepare a card without opening it.
 
-        Channel: to a gRPC device server; clock: s, of the time that the card lives in; pacer:
-        waits for the ticks of a card that has no clock of its own.
+        Parameters
+        ----------
+        table
+            Channel table of the card.
+        period
+            Period of a tick, in s.
+        channel
+            Connection to a gRPC device server; None for this computer's driver.
+        clock
+            Clock of the card's time, in s. A virtual card has its own.
+        pacer
+            Source of ticks for a card that has no clock.
         """
         self._table, self._period, self._channel = table, period, channel
-        # A tick converts a few numbers: handing them to compiled code would take longer.
+        # A tick converts a few numbers: passing them to compiled code would take longer.
         self._inputs, self._outputs = (
             rows(conversion(table.inputs)),
             rows(conversion(table.outputs)),
@@ -121,9 +139,12 @@ class Card:
         self._tasks: list[Any] = []
 
     def inspect(self) -> None:
-        """Looks whether the card is there and has what the table asks of it.
+        """Check that the card exists and has what the table requires. Nothing moves.
 
-        Raises CardFault; moves nothing.
+        Raises
+        ------
+        CardFault
+            If card, lines or ranges are missing.
         """
         from nidaqmx.system import System
 
@@ -137,7 +158,7 @@ class Card:
                     f"no card {table.device!r}; the driver knows {', '.join(names) or 'none'}"
                 )
             device = system.devices[table.device]
-            there = {
+            available = {
                 "inputs": [channel.name for channel in device.ai_physical_chans],
                 "outputs": [channel.name for channel in device.ao_physical_chans],
             }
@@ -148,10 +169,11 @@ class Card:
             ranges = {"inputs": device.ai_voltage_rngs, "outputs": device.ao_voltage_rngs}
             for group, lines in (("inputs", table.inputs), ("outputs", table.outputs)):
                 for line in lines:
-                    if table.physical(line.line) not in there[group]:
+                    if table.physical(line.line) not in available[group]:
                         raise CardFault(
                             f"{group}.{line.name}: {device.product_type} has no line {line.line}"
                         )
+                    # The driver lists both ends of every range, −10 and 10 for ±10 V.
                     if line.scaling.range not in ranges[group]:
                         known = ", ".join(
                             f"{volts:g}" for volts in sorted({abs(edge) for edge in ranges[group]})
@@ -162,6 +184,7 @@ class Card:
                         )
 
     def start(self) -> None:
+        """Reserve the lines, and start sampling. Raise CardFault if a line is in use."""
         from nidaqmx import Task
         from nidaqmx.constants import AcquisitionType
         from nidaqmx.stream_readers import AnalogMultiChannelReader
@@ -184,6 +207,7 @@ class Card:
                 )
             pressure.do_channels.add_do_chan(table.physical(table.power))
             if table.timing == "hardware":
+                # The buffer of 1000 samples covers a second in which the loop may be late.
                 inputs.timing.cfg_samp_clk_timing(
                     1.0 / self._period, sample_mode=AcquisitionType.CONTINUOUS, samps_per_chan=1000
                 )
@@ -191,8 +215,10 @@ class Card:
                 AnalogMultiChannelReader(inputs.in_stream),
                 AnalogMultiChannelWriter(outputs.out_stream),
             )
+            # Shapes are right by construction; checking them costs microseconds in every tick.
             self._reader.verify_array_shape = self._writer.verify_array_shape = False
             self._writer.auto_start = False
+            # Outputs first: once samples arrive, the loop must be able to answer them.
             for task in (outputs, pressure, inputs):
                 task.start()
             self._stream, self._power = (
@@ -202,28 +228,31 @@ class Card:
             self._power.auto_start = False
 
     def read(self) -> tuple[float, ...]:
+        """Wait for the next sample, and return it as the signals' values."""
         self.missed = 0
         if self._pacer is not None:
             self.missed, self.late = self._pacer.wait(), self._pacer.late
         try:
             self._reader.read_one_sample(self._volts, TIMEOUT)  # type: ignore[arg-type]
             if self._pacer is None:
-                self._drop_what_is_old()
+                self._drop_old_samples()
         except Exception as error:
             with translate_errors(f"card {self._table.device} gives no sample"):
                 raise error
+        # Plain floats: arithmetic on numpy scalars is several times slower.
         samples = zip(self._inputs, self._volts.tolist(), strict=True)
         return self._signals.sample(
             *[factor * volts + offset for (factor, offset, _), volts in samples]
         )
 
-    def _drop_what_is_old(self) -> None:
-        """A loop that was late finds samples waiting: only the last is worth an answer."""
+    def _drop_old_samples(self) -> None:
+        """Skip samples that wait in the buffer because the loop was late; use only the newest."""
         now = self._clock()
         if self._start < 0.0:
             self._start = now
         self.late = now - (self._start + self._count * self._period)
         if self.late > 0.5 * self._period:
+            # Samples count as missed only if the card has them: the computer's clock may be off.
             self.missed = self._stream.avail_samp_per_chan
             if self.missed:
                 waiting = np.empty((len(self._volts), self.missed))
@@ -231,12 +260,13 @@ class Card:
                 self._volts[:] = waiting[:, -1]
             self._count += self.missed
         elif self.late < 0.0:
-            # The card's clock is ahead of the computer's, or the first tick was late: its ticks
-            # are the measure.
+            # The card's clock runs ahead of the computer's, or the first tick was late. Deadlines
+            # are counted from the card's ticks, so the reference is moved.
             self._start, self.late = now - self._count * self._period, 0.0
         self._count += 1
 
     def write(self, commands: tuple[float, ...]) -> None:
+        """Set the outputs, clipped to the range of each line."""
         self._asked[:] = self._to_volts(self._signals.to_write(commands))
         try:
             self._writer.write_one_sample(self._asked)
@@ -245,6 +275,7 @@ class Card:
                 raise error
 
     def _to_volts(self, values: list[float]) -> list[float]:
+        """Return voltages, by the inverse of value = factor · volts + offset."""
         asked = zip(self._outputs, values, strict=True)
         return [
             min(max((value - offset) / factor, -reach), reach)
@@ -252,20 +283,23 @@ class Card:
         ]
 
     def power(self, on: bool) -> None:
+        """Switch the digital line that enables the actuators' power."""
         table = self._table
         with translate_errors(f"card {table.device}: {table.signals.power} line {table.power}"):
             self._power.write_one_sample_one_line(on)
 
     def stop(self) -> None:
-        """Forces to zero, power off, the card's lines given back.
+        """Set forces to zero, switch the power off, and release the lines.
 
-        A card that takes no output any more is reset, which sets them to zero. Never raises: there
-        is nobody left to hear it.
+        A card that accepts no output is reset, which sets its outputs to zero. Errors are never
+        raised: stopping goes on with whatever still works.
         """
+        # Without all three tasks the card was never started, and has nothing to stop.
         if len(self._tasks) == 3:
-            nothing = self._to_volts([0.0] * len(self._outputs))
+            zeros = self._to_volts([0.0] * len(self._outputs))
             for place in self._signals.released_places:
-                self._asked[place] = nothing[place]
+                self._asked[place] = zeros[place]
+            # Every step is tried even if the one before failed: power off is safer than nothing.
             refused = False
             try:
                 self._writer.write_one_sample(self._asked)
@@ -277,6 +311,7 @@ class Card:
                 refused = True
             if refused:
                 with suppress(Exception):
+                    # A reset is the last means: it ends every task on the card, not only these.
                     self._device().reset_device()
         for task in self._tasks:
             with suppress(Exception):
@@ -296,10 +331,12 @@ class Card:
             return None
         from nidaqmx.grpc_session_options import GrpcSessionOptions, SessionInitializationBehavior
 
+        # A new session must not silently take over the tasks of another program.
         new = SessionInitializationBehavior.INITIALIZE_SERVER_SESSION
         return GrpcSessionOptions(self._channel, name, initialization_behavior=new)
 
     def _task(self, kind: Any, name: str) -> Any:
+        """Create a task under a name by which other processes can find it."""
         try:
             task = (
                 kind(name, grpc_options=self._options(name))

@@ -1,6 +1,6 @@
-"""Values to volts and back, and the card's 16 bits in between.
+"""Conversion between values, volts and the 16-bit codes of the card's converters.
 
-The same for client, twin and virtual card.
+Card, twin and virtual card use the same functions.
 """
 
 from __future__ import annotations
@@ -11,18 +11,25 @@ from typing import NamedTuple
 import numpy as np
 
 from controllers.compiled import compilable
-from rigtwin.hardware.daq.table import Line
+from rigtwin.hardware.daq.table import CardLine
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
 
 CODES = 65536
-"""Of 16 bits."""
+"""Number of codes of a 16-bit converter."""
 
 
 class Conversion(NamedTuple):
-    """Scalings of several lines, each of shape (lines,).
+    """Scalings of several lines as arrays of shape (lines,).
 
-    Factor = sign · scale in unit/V, offset in the unit, range in V.
+    Attributes
+    ----------
+    factor
+        Product of sign and scale, in the signal's unit per V.
+    offset
+        Value at 0 V, in the signal's unit.
+    range
+        Largest voltage, in V, in both directions.
     """
 
     factor: Array
@@ -30,7 +37,8 @@ class Conversion(NamedTuple):
     range: Array
 
 
-def conversion(lines: Sequence[Line]) -> Conversion:
+def conversion(lines: Sequence[CardLine]) -> Conversion:
+    """Return the scalings of lines as arrays."""
     scalings = [line.scaling for line in lines]
     return Conversion(
         np.array([scaling.sign * scaling.scale for scaling in scalings]),
@@ -40,7 +48,7 @@ def conversion(lines: Sequence[Line]) -> Conversion:
 
 
 def rows(lines: Conversion) -> list[tuple[float, float, float]]:
-    """Factor, offset and range of each line, as Python reads them fastest."""
+    """Return factor, offset and range per line as tuples, which plain Python reads fastest."""
     return list(
         zip(lines.factor.tolist(), lines.offset.tolist(), lines.range.tolist(), strict=True)
     )
@@ -48,7 +56,7 @@ def rows(lines: Conversion) -> list[tuple[float, float, float]]:
 
 @compilable
 def volts_of(lines: Conversion, values: Array, out: Array) -> None:
-    """The voltages that stand for values, both of shape (lines,), not beyond the lines' ranges."""
+    """Convert values to voltages, both of shape (lines,), clipped to the lines' ranges."""
     for line in range(len(out)):
         volts = (values[line] - lines.offset[line]) / lines.factor[line]
         out[line] = min(max(volts, -lines.range[line]), lines.range[line])
@@ -56,16 +64,17 @@ def volts_of(lines: Conversion, values: Array, out: Array) -> None:
 
 @compilable
 def values_of(lines: Conversion, volts: Array, out: Array) -> None:
-    """What voltages stand for, both of shape (lines,)."""
+    """Convert voltages to values, both of shape (lines,)."""
     for line in range(len(out)):
         out[line] = lines.factor[line] * volts[line] + lines.offset[line]
 
 
 @compilable
 def digitise(lines: Conversion, volts: Array, out: Array) -> None:
-    """Voltages as 16 bits hold them, both of shape (lines,)."""
+    """Round voltages, shape (lines,), to the codes of a 16-bit converter."""
     for line in range(len(out)):
         bit = 2.0 * lines.range[line] / CODES
+        # Two's complement: the most positive code is one step short of the range.
         code = min(max(float(np.rint(volts[line] / bit)), -CODES / 2.0), CODES / 2.0 - 1.0)
         out[line] = bit * code
 

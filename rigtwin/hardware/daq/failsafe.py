@@ -1,4 +1,4 @@
-"""Makes a card's outputs safe when the process that owned them is dead or hangs."""
+"""Fail-safe outputs: sets a card's outputs to safe values after their owner died or hung."""
 
 from __future__ import annotations
 
@@ -21,13 +21,12 @@ from rigtwin.hardware.daq.table import ChannelTable
 from rigtwin.numerics.arrays import Array
 
 
-class LastResort:
-    """Sets a card's outputs to their safe state in place of their owner.
+class FailsafeOutputs:
+    """Access to a card's outputs in place of the process that owned them.
 
-    On a gRPC device server they are found by their name, which can be done beforehand.
-
-    A driver on this computer gives them back when it sees that their owner is dead; then they are
-    taken anew.
+    On a gRPC device server the owner's tasks are found by their names, even while the owner lives.
+    A driver on this computer frees the lines when their owner's process is gone. They are then
+    reserved anew.
     """
 
     def __init__(self, table: ChannelTable) -> None:
@@ -37,20 +36,29 @@ class LastResort:
         self._tasks: list[Any] = []
         count = len(table.outputs)
         self._values, self._volts = np.zeros(count), np.empty(count)
-        to_volts(self._conversion, self._values, self._volts)  # compiled before it is needed
-
-        connect(table.address)  # loads the driver's client, which takes a while
+        # Compilation and loading of the driver's client take seconds, which an emergency has not.
+        to_volts(self._conversion, self._values, self._volts)
+        connect(table.address)
 
     def prepare(self) -> None:
-        """Called once the owner has its outputs. Raises CardFault."""
+        """Attach to the owner's tasks once it has them. Raise CardFault if that fails."""
+        # Without a server there is nothing to attach to while the owner lives.
         if self._table.address:
             with translate_errors(f"card {self._table.device}: watching it"):
                 self._attach()
 
     def hold(self, outputs: Sequence[float] | Array) -> None:
-        """Sets the outputs to the values that are safe now: no force, positions held.
+        """Set the outputs to safe values: zero force, positions held.
 
-        Raises CardFault.
+        Parameters
+        ----------
+        outputs
+            Value of each output, in its unit.
+
+        Raises
+        ------
+        CardFault
+            If the card accepts no output.
         """
         self._values[:] = outputs
         to_volts(self._conversion, self._values, self._volts)
@@ -61,7 +69,7 @@ class LastResort:
             self._outputs.write_one_sample(self._volts)
 
     def power_off(self) -> None:
-        """Raises CardFault."""
+        """Switch the actuators' power off. Raise CardFault if the card does not."""
         with translate_errors(f"card {self._table.device}: taking its power off"):
             if self._power is None:
                 self._take()
@@ -69,7 +77,7 @@ class LastResort:
             self._power.write_one_sample_one_line(False)
 
     def close(self) -> None:
-        """Gives the lines back."""
+        """Release the lines."""
         for task in self._tasks:
             with suppress(Exception):
                 task.stop()
@@ -78,6 +86,7 @@ class LastResort:
         self._tasks, self._outputs, self._power = [], None, None
 
     def _attach(self) -> None:
+        """Attach to the owner's tasks on a gRPC device server."""
         from nidaqmx import Task
         from nidaqmx.grpc_session_options import GrpcSessionOptions, SessionInitializationBehavior
 
@@ -92,6 +101,7 @@ class LastResort:
         self._open_writers(started=True)
 
     def _take(self) -> None:
+        """Reserve the outputs under new names."""
         from nidaqmx import Task
 
         self.close()
@@ -105,6 +115,7 @@ class LastResort:
             outputs, pressure = (
                 Task(name, grpc_options=GrpcSessionOptions(channel, name)) for name in names
             )
+        # Outputs and power only: the inputs are of no use any more.
         self._tasks = [outputs, pressure]
         for line in self._table.outputs:
             volts = line.scaling.range
@@ -115,6 +126,7 @@ class LastResort:
         self._open_writers(started=False)
 
     def _open_writers(self, started: bool) -> None:
+        """Open writers on the tasks; tasks that run already must not be started again."""
         from nidaqmx.stream_writers import AnalogMultiChannelWriter, DigitalSingleChannelWriter
 
         self._outputs = AnalogMultiChannelWriter(self._tasks[0].out_stream)
@@ -124,18 +136,28 @@ class LastResort:
 
 
 def release(table: ChannelTable) -> bool:
-    """Frees what a program that died has left on a gRPC device server.
+    """Free the lines that a dead program has left reserved on a gRPC device server.
 
-    Forces to zero, power off, its tasks ended. Returns whether there was anything. Raises
-    CardFault if the outputs could not be set.
+    Forces are set to zero, the power is switched off, and the tasks are ended.
+
+    Returns
+    -------
+    bool
+        Whether any task was left.
+
+    Raises
+    ------
+    CardFault
+        If the outputs could not be set.
     """
-    resort = LastResort(table)
+    outputs = FailsafeOutputs(table)
     try:
-        resort.prepare()
-        left = True
+        outputs.prepare()
+        reserved = True
     except CardFault:
-        left = False
-    resort.power_off()
-    resort.hold([0.0] * len(table.outputs))
-    resort.close()
-    return left
+        reserved = False
+    # Power off first: it makes the rig safe even if the outputs then fail.
+    outputs.power_off()
+    outputs.hold([0.0] * len(table.outputs))
+    outputs.close()
+    return reserved

@@ -1,4 +1,4 @@
-"""The twin of a described machine as it looks at a card's terminals."""
+"""Twin of a described machine as seen at a card's terminals."""
 
 from __future__ import annotations
 
@@ -15,16 +15,19 @@ from rigtwin.models.reading import hum_of, round_reading
 from rigtwin.numerics.arrays import Array
 
 AHEAD = 1000
-"""Ticks for which noise is drawn at a time."""
+"""Number of ticks whose noise is drawn in one block."""
 
 
 class MachineTerminals:
-    """A described machine at rest as its MJCF has it, without power.
+    """A described machine at rest in the pose of its MJCF, with the power off.
 
-    Without power nothing moves: its brakes hold it. `wiring` says what a volt truly means on each
-    line, whatever the table of who reads it says.
+    Without power nothing moves, because brakes hold the machine. `wiring` is the true meaning of a
+    volt on each line, whatever the reader's channel table says.
 
-    volts: at the inputs now, as 16 bits hold them, shape (inputs,).
+    Attributes
+    ----------
+    volts
+        Voltages at the inputs, rounded to 16 bits, shape (inputs,).
     """
 
     def __init__(
@@ -43,6 +46,7 @@ class MachineTerminals:
         self._states = [start_transducer(model) for model in self._models]
         self._inputs, self._outputs = conversion(wiring.inputs), conversion(wiring.outputs)
         self._random, self._place = np.random.default_rng([seed, 3]), AHEAD
+        # Each sensor's hum has a random phase of its own.
         self._phases, self._drawn = self._random.uniform(0.0, 2.0 * np.pi, len(rows)), 0
         self._noise: list[Array] = []
         self._written = np.zeros(len(outputs))
@@ -50,15 +54,18 @@ class MachineTerminals:
         self._sample()
 
     def advance(self, written: Array, power: bool) -> None:
-        """One period under voltages that the outputs hold, shape (outputs,), then the next
-        sample."""
+        """Advance by one period under held output voltages, shape (outputs,), and sample."""
+        # Without power the brakes hold the machine: its state does not advance.
         if power:
+            # The actuators receive what the card's 16-bit converter makes of a voltage.
             to_bits(self._outputs, written, self._written)
             to_values(self._outputs, self._written, self._written)
             self._stepped.step(self._written.tolist())
         self._sample()
 
     def _sample(self) -> None:
+        """Sample the sensors: noise and hum, transducer, quantisation, conversion to volts."""
+        # Noise is drawn in blocks, because one draw per tick would cost more than the step.
         if self._place == AHEAD:
             time = self._period * (self._drawn + np.arange(AHEAD))
             self._noise = [
@@ -71,6 +78,7 @@ class MachineTerminals:
         for number, name in enumerate(self._names):
             value = transduce(self._models[number], self._states[number], true[name])
             self._values[number] = value + self._noise[number][self._place]
+            # A sensor with its own resolution quantises before the card's converter does.
             if getattr(self._plant, name).resolution > 0.0:
                 reading = round_reading(self._plant, name, self._values[number : number + 1])
                 self._values[number] = reading[0]

@@ -1,4 +1,4 @@
-"""What of a machine is connected to a card: what it senses, what is commanded, and what is safe."""
+"""Signals between a machine and a card: sensors, commands, and the safe state of each output."""
 
 from __future__ import annotations
 
@@ -16,19 +16,29 @@ from rigtwin.models.demands import list_movers, list_pushers, list_sensors
 from rigtwin.recording.channels import CHANNELS
 
 Channel = tuple[str, str]
-"""Topic and field."""
+"""Topic and field of a recording."""
 RESERVED = ("time", "phase", "enable", "late", "missed")
-"""Fields of a session's own topic."""
+"""Names of a session's own fields, which no component may have."""
 
 
-def sample_of(*values: float) -> tuple[float, ...]:
-    """What was read, or is to be written."""
+def as_tuple(*values: float) -> tuple[float, ...]:
+    """Return the values of a sample or a command as a tuple."""
     return values
 
 
 @dataclass(frozen=True)
 class Signal:
-    """name: in the channel table; channel: in a recording; unit: of its value."""
+    """Signal on a card.
+
+    Attributes
+    ----------
+    name
+        Name in the channel table.
+    channel
+        Channel in a recording.
+    unit
+        Unit of the value.
+    """
 
     name: str
     channel: Channel
@@ -37,20 +47,20 @@ class Signal:
 
 @dataclass(frozen=True)
 class Signals:
-    """A machine's.
+    """Signals of a machine.
 
     Parameters
     ----------
     inputs, outputs : tuple of Signal
-        In the order of what is read, and of what is written.
+        Sensors and commands, in the order in which the card reads and writes them.
     power : str
-        What the digital line is called that lets the actuators have power while high.
+        Name of the digital line that enables the actuators' power while high.
     released : tuple of bool
-        Of each output, whether its safe state is zero, a force, or where it stands.
+        Whether the safe state of each output is zero, as for a force; otherwise it is held.
     written : tuple of int
-        Of each output, its place among a controller's commands.
+        Index of each output in the controller's commands.
     sample, commands : callable
-        What makes a sample of the inputs' values, and commands of theirs.
+        Functions that form a sample, and commands, from values.
     """
 
     inputs: tuple[Signal, ...]
@@ -58,20 +68,20 @@ class Signals:
     power: str
     released: tuple[bool, ...]
     written: tuple[int, ...]
-    sample: Callable[..., tuple[float, ...]] = field(default=sample_of, compare=False)
-    commands: Callable[..., tuple[float, ...]] = field(default=sample_of, compare=False)
+    sample: Callable[..., tuple[float, ...]] = field(default=as_tuple, compare=False)
+    commands: Callable[..., tuple[float, ...]] = field(default=as_tuple, compare=False)
 
     @property
     def released_places(self) -> list[int]:
-        """Outputs whose safe state is zero."""
+        """Indices of the outputs whose safe state is zero."""
         return [place for place, released in enumerate(self.released) if released]
 
     def to_write(self, commands: tuple[float, ...]) -> list[float]:
-        """Of each output, its value among commands."""
+        """Return the value of each output from the controller's commands."""
         return [commands[place] for place in self.written]
 
     def stop_state(self, outputs: list[float]) -> list[float]:
-        """The outputs' safe state after these values."""
+        """Return the safe state that follows these values of the outputs."""
         return [
             0.0 if released else value
             for released, value in zip(self.released, outputs, strict=True)
@@ -91,36 +101,41 @@ RIG = Signals(
     sample=Measurements,
     commands=Commands,
 )
-"""The suspension rig's. The force demanded stays inside the controller."""
+"""Signals of the suspension rig. The demanded force is internal to the controller."""
 
 
 def signals_of(machine: Machine) -> Signals:
-    """A described machine's.
+    """Return the signals of a described machine.
 
     Parameters
     ----------
     machine
-        Its description.
+        Machine whose signals are wanted.
 
     Returns
     -------
     Signals
-        Its sensors and its actuators, by their components' names.
+        Sensors and actuators under their components' names.
 
     Raises
     ------
     RigtwinError
-        If it has joints that no actuator pushes, but a sensor or a position actuator prescribes.
+        If a joint's motion is prescribed by a sensor or position actuator, which a card cannot
+        command, or if nothing can be commanded.
     """
     movers, pushers, components = list_movers(machine), list_pushers(machine), machine.components
+    # A prescribed motion is an input of the model, which no output of a card can impose.
     if prescribed := [name for name in movers if name not in pushers]:
         raise RigtwinError(
             f"{machine.name}: {prescribed[0]} prescribes a motion, which a card cannot command; "
             "expected force actuators and servos alone"
         )
     if not pushers:
-        raise RigtwinError(f"{machine.name}: nothing of it can be commanded")
+        raise RigtwinError(
+            f"{machine.name}: nothing to command; expected at least one force actuator or servo"
+        )
     sensors = list_sensors(machine)
+    # Components share /session with the session's own fields.
     for name in (*sensors, *pushers):
         if name in RESERVED:
             raise RigtwinError(
@@ -142,6 +157,6 @@ def signals_of(machine: Machine) -> Signals:
 
 
 def reach_of(configuration: Configuration, name: str) -> tuple[float, float]:
-    """The limits of a described machine's sensor or actuator, infinite where it has none."""
-    told = configuration.safety._asdict()
-    return told.get(name + LOW, -math.inf), told.get(name + HIGH, math.inf)
+    """Return the limits of a described machine's sensor or actuator, infinite without a limit."""
+    limits = configuration.safety._asdict()
+    return limits.get(name + LOW, -math.inf), limits.get(name + HIGH, math.inf)

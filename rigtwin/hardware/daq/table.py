@@ -1,8 +1,8 @@
-"""The channel table: which signal is on which line of the card, and what a volt means there.
+"""Channel table: the line of each signal on the card, and the meaning of a volt on that line.
 
-One TOML file a card.
+There is one TOML file per card. Inputs and outputs convert by the same equation,
 
-value = sign · scale · volts + offset, in both directions.
+    value = sign · scale · volts + offset.
 """
 
 from __future__ import annotations
@@ -24,20 +24,21 @@ from rigtwin.hardware.daq.signals import RIG, Signal, Signals
 
 Group = TypeVar("Group")
 OUTPUTS = tuple(signal.name for signal in RIG.outputs)
-"""Commands of the rig that go to the card, in the order of its writes."""
+"""Commands of the rig that go to the card, in the order in which they are written."""
 HEADROOM = 1.05
-"""A signal must be readable this far beyond its limit: one that stops at its limit can never be
-seen to exceed it."""
+"""Factor by which a line's range must exceed the signal's limit. A signal that saturates at its
+limit could never be seen to exceed it."""
+# Names of the driver's lines, such as ai0, ao3 and port0/line2.
 _ANALOG = {"inputs": re.compile(r"ai\d{1,3}"), "outputs": re.compile(r"ao\d{1,2}")}
 _DIGITAL = re.compile(r"port\d/line\d{1,2}")
 OLDEST = 10 * 365
-"""Days after which a calibration is none."""
+"""Age in days above which a calibration is refused."""
 _FREE_TEXT = ("device", "address", "timing", "calibrated", "operator", "note")
 _TIMINGS = ("hardware", "software")
 
 
-class Scaling(NamedTuple):
-    """What a volt means on a line."""
+class LineScaling(NamedTuple):
+    """Meaning of a volt on a line."""
 
     scale: Annotated[float, Quantity("unit/V", 1e-9, 1e9, "calibration")]
     offset: Annotated[float, Quantity("unit", -1e6, 1e6, "calibration")] = 0.0
@@ -46,10 +47,10 @@ class Scaling(NamedTuple):
 
 
 class Plausible(NamedTuple):
-    """What living sensors of one rig cannot do; see rigtwin.simulation.safety.
+    """Limits of what working sensors of the suspension rig can show together.
 
-    stuck: same readings in a row. Greatest seen on the twin in all experiments: 4 readings, 9.5
-    mm, 34 N.
+    See rigtwin.simulation.safety. `stuck` counts equal readings in a row. The largest values on
+    the twin in all experiments are 4 readings, 9.5 mm and 34 N.
     """
 
     stuck: Annotated[
@@ -63,61 +64,76 @@ class Plausible(NamedTuple):
     ] = 100.0
 
 
-class Alive(NamedTuple):
-    """What living sensors of a described machine cannot do. stuck: same readings in a row; 0 where
-    a sensor that is alive may well give them."""
+class StuckLimit(NamedTuple):
+    """Limit of what working sensors of a described machine can show.
 
-    stuck: Annotated[float, Quantity("tick", 0.0, 1e9, "of readings as the card has them")] = 0.0
+    `stuck` counts equal readings in a row; 0 where a working sensor may repeat itself.
+    """
+
+    stuck: Annotated[
+        float, Quantity("tick", 0.0, 1e9, "of readings after the card's conversion")
+    ] = 0.0
 
 
-class Line(NamedTuple):
-    """One signal of the machine.
+class CardLine(NamedTuple):
+    """Line of the card, and the machine's signal on it.
 
-    line: as the driver calls it behind the device's name. sign_checked: whether somebody has seen
-    the signal move the way that it should.
+    Attributes
+    ----------
+    name
+        Name of the signal.
+    line
+        Name of the line in the driver, without the device's name.
+    unit
+        Unit of the signal.
+    scaling
+        Meaning of a volt.
+    sign_checked
+        Whether an operator has seen the signal move in the right direction.
     """
 
     name: str
     line: str
     unit: str
-    scaling: Scaling
+    scaling: LineScaling
     sign_checked: bool
 
     @property
     def reach(self) -> float:
-        """The greatest magnitude that fits through the line both ways."""
+        """Largest magnitude, in the signal's unit, that the line can carry in both directions."""
+        # An offset shifts the range, so one direction carries less.
         return self.scaling.range * self.scaling.scale - abs(self.scaling.offset)
 
 
 @dataclass(frozen=True)
 class ChannelTable:
-    """A card's channel table.
+    """Channel table of a card.
 
     Parameters
     ----------
-    inputs, outputs : tuple of Line
-        In the order of its machine's signals.
+    inputs, outputs : tuple of CardLine
+        Lines in the order of the machine's signals.
     power : str
-        The digital line that lets the actuators have power while high: of the rig, the hydraulics
-        their pressure.
-    plausible : Plausible
-        What its sensors cannot do.
+        Digital line that enables the actuators' power while high; on the suspension rig, the
+        hydraulic pressure.
+    plausible : Plausible or StuckLimit
+        Limits of what working sensors can show.
     device : str
-        The driver's name of the card.
+        Name of the card in the driver.
     address : str
-        Of a gRPC device server, empty for this computer's driver.
+        Address of a gRPC device server; empty for this computer's driver.
     timing : str
-        hardware or software: whose clock the inputs follow.
+        `hardware` or `software`: the clock that the inputs follow.
     calibrated, operator, note : str
-        When, by whom, and what they say.
+        Date, author and remark of the calibration.
     signals : Signals
-        Of the machine that it is of.
+        Signals of the machine on the card.
     """
 
-    inputs: tuple[Line, ...]
-    outputs: tuple[Line, ...]
+    inputs: tuple[CardLine, ...]
+    outputs: tuple[CardLine, ...]
     power: str
-    plausible: Plausible | Alive
+    plausible: Plausible | StuckLimit
     device: str = "Dev1"
     address: str = ""
     timing: str = "hardware"
@@ -127,15 +143,16 @@ class ChannelTable:
     signals: Signals = RIG
 
     @property
-    def lines(self) -> tuple[Line, ...]:
+    def lines(self) -> tuple[CardLine, ...]:
+        """All lines, inputs first."""
         return self.inputs + self.outputs
 
     def physical(self, line: str) -> str:
-        """The driver's name of a line."""
+        """Return the driver's full name of a line."""
         return f"{self.device}/{line}"
 
     def tighten(self, safety: Safety) -> Safety:
-        """Gives the limits with what the card knows of its sensors, where that is closer."""
+        """Return the limits, tightened by the table's limits on plausibility."""
         return safety._replace(
             **{
                 name: min(value, getattr(safety, name))
@@ -167,30 +184,35 @@ def find_table(path: Path) -> Path:
 
 
 def load_table(path: Path, signals: Signals = RIG) -> ChannelTable:
-    """Reads the channel table of a machine with these signals. Raises RigtwinError naming file and
-    fault."""
-    return read_toml(find_table(path), lambda tables: parse_table(tables, signals))
-
-
-def parse_table(tables: Mapping[str, Any], signals: Signals = RIG) -> ChannelTable:
-    """Reads a channel table from TOML's tables.
-
-    Parameters
-    ----------
-    tables : mapping
-        [card], [plausible], [inputs.NAME], [outputs.NAME].
-    signals : Signals
-        Of its machine.
-
-    Returns
-    -------
-    ChannelTable
-        Complete.
+    """Read the channel table of a machine with these signals.
 
     Raises
     ------
     RigtwinError
-        For anything missing, unknown or twice.
+        If the table is wrong; the message names the file and the mistake.
+    """
+    return read_toml(find_table(path), lambda tables: parse_table(tables, signals))
+
+
+def parse_table(tables: Mapping[str, Any], signals: Signals = RIG) -> ChannelTable:
+    """Read a channel table from TOML tables.
+
+    Parameters
+    ----------
+    tables : mapping
+        Tables [card], [plausible], [inputs.NAME] and [outputs.NAME].
+    signals : Signals
+        Signals of the machine.
+
+    Returns
+    -------
+    ChannelTable
+        Complete channel table.
+
+    Raises
+    ------
+    RigtwinError
+        If an entry is missing, unknown, or a line is used twice.
     """
     known = ("card", "plausible", "inputs", "outputs")
     for name in tables:
@@ -200,6 +222,34 @@ def parse_table(tables: Mapping[str, Any], signals: Signals = RIG) -> ChannelTab
                 "[outputs.NAME]"
             )
     card = tables.get("card", {})
+    _check_card(card, signals)
+    power = card[signals.power]
+    inputs = _lines("inputs", tables.get("inputs", {}), signals.inputs)
+    outputs = _lines("outputs", tables.get("outputs", {}), signals.outputs)
+    taken: dict[str, str] = {}
+    # Two signals on one line would read, or overwrite, each other's values.
+    for line in inputs + outputs:
+        if line.line in taken:
+            raise RigtwinError(
+                f"{taken[line.line]} and {line.name} are both on line {line.line}; "
+                "expected a line each"
+            )
+        taken[line.line] = line.name
+    texts = {key: card[key] for key in _FREE_TEXT if key in card}
+    # Only the suspension rig has sensors that can be checked against each other.
+    plausible = Plausible if signals == RIG else StuckLimit
+    return ChannelTable(
+        inputs,
+        outputs,
+        power,
+        _numbers("plausible", tables.get("plausible", {}), plausible),
+        **texts,
+        signals=signals,
+    )
+
+
+def _check_card(card: Any, signals: Signals) -> None:
+    """Raise RigtwinError unless the table [card] is complete and known."""
     if not isinstance(card, Mapping):
         raise RigtwinError("card: expected a table, [card]")
     for key, value in card.items():
@@ -223,29 +273,10 @@ def parse_table(tables: Mapping[str, Any], signals: Signals = RIG) -> ChannelTab
             f"card.device = {card['device']!r}: expected the driver's name of the card, "
             "such as 'Dev1'"
         )
-    inputs = _lines("inputs", tables.get("inputs", {}), signals.inputs)
-    outputs = _lines("outputs", tables.get("outputs", {}), signals.outputs)
-    taken: dict[str, str] = {}
-    for line in inputs + outputs:
-        if line.line in taken:
-            raise RigtwinError(
-                f"{taken[line.line]} and {line.name} are both on line {line.line}; "
-                "expected a line each"
-            )
-        taken[line.line] = line.name
-    texts = {key: card[key] for key in _FREE_TEXT if key in card}
-    plausible = Plausible if signals == RIG else Alive
-    return ChannelTable(
-        inputs,
-        outputs,
-        power,
-        _numbers("plausible", tables.get("plausible", {}), plausible),
-        **texts,
-        signals=signals,
-    )
 
 
 def _numbers(where: str, table: Any, kind: Callable[..., Group]) -> Group:
+    """Return a group of checked numbers from a table; missing ones keep their defaults."""
     if not isinstance(table, Mapping):
         raise RigtwinError(f"{where} = {table!r}: expected a table")
     meanings = fields(kind)  # type: ignore[arg-type]
@@ -257,7 +288,7 @@ def _numbers(where: str, table: Any, kind: Callable[..., Group]) -> Group:
     )
 
 
-def _lines(group: str, tables: Any, signals: Sequence[Signal]) -> tuple[Line, ...]:
+def _lines(group: str, tables: Any, signals: Sequence[Signal]) -> tuple[CardLine, ...]:
     names = [signal.name for signal in signals]
     if not isinstance(tables, Mapping):
         raise RigtwinError(f"{group}: expected tables, such as [{group}.{names[0]}]")
@@ -272,7 +303,7 @@ def _lines(group: str, tables: Any, signals: Sequence[Signal]) -> tuple[Line, ..
     return tuple(_line(group, s.name, tables[s.name], s.unit) for s in signals)
 
 
-def _line(group: str, name: str, table: Any, unit: str) -> Line:
+def _line(group: str, name: str, table: Any, unit: str) -> CardLine:
     where = f"{group}.{name}"
     if not isinstance(table, Mapping):
         raise RigtwinError(f"{where} = {table!r}: expected a table with line and scale")
@@ -290,18 +321,19 @@ def _line(group: str, name: str, table: Any, unit: str) -> Line:
     if "scale" not in table:
         raise RigtwinError(f"{where}.scale is missing: expected {unit} a volt")
     scaling = _numbers(
-        where, {key: value for key, value in table.items() if key not in texts}, Scaling
+        where, {key: value for key, value in table.items() if key not in texts}, LineScaling
     )
+    # The range in the annotation allows −1 to 1; a sign is one of its ends.
     if abs(scaling.sign) != 1.0:
         raise RigtwinError(f"{where}.sign = {scaling.sign:g}: expected 1 or -1")
     sign_checked = table.get("sign_checked", False)
     if not isinstance(sign_checked, bool):
         raise RigtwinError(f"{where}.sign_checked = {sign_checked!r}: expected true or false")
-    return Line(name, line, unit, scaling, sign_checked)
+    return CardLine(name, line, unit, scaling, sign_checked)
 
 
 def require_ranges(table: ChannelTable, safety: Safety) -> None:
-    """Raises RigtwinError unless every limit of the rig lies within what its line can carry."""
+    """Raise RigtwinError unless every line can carry its signal up to the rig's limit."""
     require_reach(
         table,
         {
@@ -316,11 +348,19 @@ def require_ranges(table: ChannelTable, safety: Safety) -> None:
 
 
 def require_reach(table: ChannelTable, limits: Mapping[str, tuple[str, float]]) -> None:
-    """Raises RigtwinError unless every limit lies within what its line can carry. limits: signal →
-    the limit's name, and its magnitude."""
+    """Raise RigtwinError unless every line can carry its signal up to a limit.
+
+    Parameters
+    ----------
+    table
+        Channel table.
+    limits
+        Signal → name and magnitude of its limit, in the signal's unit.
+    """
     inputs = [line.name for line in table.inputs]
     for line in table.lines:
         key, limit = limits.get(line.name, ("", 0.0))
+        # An input must show that a limit is exceeded; an output must only reach it.
         if line.reach < HEADROOM * limit and line.name in inputs:
             raise RigtwinError(
                 "range too small for the limit: "
@@ -337,9 +377,11 @@ def require_reach(table: ChannelTable, limits: Mapping[str, tuple[str, float]]) 
 
 
 def list_doubts(table: ChannelTable, today: date) -> list[str]:
-    """Why this table must not move a real machine, a line each: signs that nobody has checked, or
-    no word of when and by whom it was calibrated."""
-    found: list[str] = []
+    """Return the reasons why this table must not move a real machine, one per line.
+
+    A table is trusted if every sign was checked, and it states when and by whom it was calibrated.
+    """
+    doubts: list[str] = []
     unchecked = [line.name for line in table.lines if not line.sign_checked]
     if unchecked:
         how = (
@@ -347,34 +389,33 @@ def list_doubts(table: ChannelTable, today: date) -> list[str]:
             if table.signals == RIG
             else "move each a little, and say sign_checked = true once it goes the right way"
         )
-        found.append(f"sign not checked: {', '.join(unchecked)}; {how}")
-    told = f"card.calibrated = {table.calibrated!r}"
+        doubts.append(f"sign not checked: {', '.join(unchecked)}; {how}")
+    entry = f"card.calibrated = {table.calibrated!r}"
     try:
         calibrated = date.fromisoformat(table.calibrated)
     except ValueError:
-        found.append(f"{told}: expected the date of calibration, 2026-01-31")
+        doubts.append(f"{entry}: expected the date of calibration, 2026-01-31")
     else:
-        told = f"card.calibrated = {table.calibrated}"
+        entry = f"card.calibrated = {table.calibrated}"
         if calibrated > today:
-            found.append(f"{told}: that is after today, {today}")
+            doubts.append(f"{entry}: that is after today, {today}")
         if (today - calibrated).days > OLDEST:
-            found.append(f"{told}: that is more than {OLDEST // 365} years ago; calibrate it anew")
+            doubts.append(
+                f"{entry}: that is more than {OLDEST // 365} years ago; calibrate it anew"
+            )
     if not table.operator.strip():
-        found.append("card.operator is missing: expected who calibrated it")
-    return found
+        doubts.append("card.operator is missing: expected who calibrated it")
+    return doubts
 
 
 def require_trust(table: ChannelTable, today: date) -> None:
-    """Raises RigtwinError unless somebody has calibrated this table and checked every sign.
-
-    Needed to move a real machine.
-    """
+    """Raise RigtwinError unless the table may move a real machine (see `list_doubts`)."""
     for doubt in list_doubts(table, today):
         raise RigtwinError(doubt)
 
 
 def to_toml(table: ChannelTable) -> str:
-    """The table as TOML."""
+    """Return the channel table as TOML text."""
     lines = ["[card]", f"{table.signals.power} = {_quote(table.power)}"]
     lines += [f"{key} = {_quote(getattr(table, key))}" for key in _FREE_TEXT]
     lines += [
@@ -402,7 +443,7 @@ def to_toml(table: ChannelTable) -> str:
 
 
 def _quote(text: str) -> str:
-    # What came in another encoding than UTF-8 has no sign of its own.
+    # Text that was read with surrogate escapes, from another encoding, cannot be written as UTF-8.
     known = text.encode("utf-8", "replace").decode()
     escaped = known.replace("\\", "\\\\").replace('"', '\\"')
     return '"' + "".join(c if c.isprintable() else f"\\U{ord(c):08x}" for c in escaped) + '"'

@@ -1,7 +1,4 @@
-"""The twin as it looks at a card's terminals.
-
-Voltages in, voltages out, and the hydraulics' pressure.
-"""
+"""Twin of the suspension rig as seen at a card's terminals: voltages and hydraulic pressure."""
 
 from __future__ import annotations
 
@@ -26,11 +23,11 @@ from rigtwin.simulation.plant import PlantState, advance, sense
 from rigtwin.simulation.twin import Twin
 
 AHEAD = 256
-"""Ticks for which noise is drawn at a time."""
+"""Number of ticks whose noise is drawn in one block."""
 
 
 def without_bits(plant: RigPlant) -> RigPlant:
-    """The plant with sensors that have no bits: those are the card's."""
+    """Return the plant with sensors of infinite resolution; the card's converter quantises."""
     names = Measurements._fields
     return plant._replace(
         **{
@@ -49,6 +46,7 @@ def _sample(
     truth: Array,
     volts: Array,
 ) -> None:
+    # Order of the signal chain: truth, transducer with noise, voltage, 16-bit code.
     true = sense(plant)
     measured = sample_sensors(sensing, true, disturbance)
     for column in range(4):
@@ -69,6 +67,7 @@ def _advance(
     truth: Array,
     volts: Array,
 ) -> None:
+    # The card's converter quantises the outputs too, before the actuators see them.
     digitise(outputs, written, asked)
     values_of(outputs, asked, asked)
     advance(plant, asked[0], asked[1], asked[2])
@@ -79,17 +78,23 @@ _first_sample = kernel(_sample)
 
 
 class Terminals:
-    """A rig at rest, cylinders at zero, no pressure.
+    """The suspension rig at rest, with its cylinders at zero and without pressure.
 
-    `wiring` says what a volt truly means on each line, whatever the table of who reads it says.
+    `wiring` is the true meaning of a volt on each line, whatever the reader's channel table says.
     Without pressure the cylinders stay where they are.
 
-    truth: last measurements without noise, before the wiring, shape (4,). asked: what the
-    actuators make of the voltages, shape (3,), in the order of the table's outputs. volts: at the
-    inputs now, as 16 bits hold them, shape (4,).
+    Attributes
+    ----------
+    truth
+        Last measurements without noise, before conversion to volts, shape (4,).
+    asked
+        Commands the actuators receive, shape (3,), in the order of the table's outputs.
+    volts
+        Voltages at the inputs, rounded to 16 bits, shape (4,).
     """
 
     def __init__(self, configuration: Configuration, wiring: ChannelTable, seed: int) -> None:
+        # Without pressure the rig stands at zero, wherever the test will start.
         rest = configuration.controller._replace(start=0.0, preload=0.0)
         twin = Twin(
             configuration._replace(plant=without_bits(configuration.plant), controller=rest),
@@ -97,6 +102,7 @@ class Terminals:
             seed,
         )
         self._twin, self._live = twin, twin.simulation.state
+        # Without pressure a cylinder does not move: a step of 0 freezes its filter.
         self._dead = self._live._replace(
             ground=self._live.ground._replace(step=0.0),
             structure=self._live.structure._replace(step=0.0),
@@ -109,7 +115,7 @@ class Terminals:
         )
 
     def advance(self, written: Array, power: bool) -> None:
-        """One period under voltages that the outputs hold, shape (3,), then the next sample."""
+        """Advance by one period under held output voltages, shape (3,), and sample."""
         self._place += 1
         if self._place == AHEAD:
             self._noise, self._place = self._twin.disturbance.take(AHEAD), 0

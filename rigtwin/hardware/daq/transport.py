@@ -1,10 +1,8 @@
-"""Carries the calls of the unmodified nidaqmx client to a virtual card.
+"""Transport of an unmodified nidaqmx client's calls to a virtual card.
 
-In process, or through a socket.
-
-nidaqmx can speak to NI's gRPC device server instead of to a driver. `InProcess` is such a
-connection that ends in a Python object; `serve` listens on a port, so that any NI-DAQmx gRPC
-client can use the twin as its card.
+nidaqmx can use NI's gRPC device server in place of a driver. `InProcess` is such a connection that
+ends in a Python object. `serve` listens on a port, so that any NI-DAQmx gRPC client can use the
+twin as its card.
 """
 
 from __future__ import annotations
@@ -22,11 +20,11 @@ from rigtwin.hardware.daq.virtual import DriverError, VirtualCard
 
 SERVICE = "nidaqmx_grpc.NiDAQmx"
 LOCAL = "127.0.0.1"
-"""By number: what listens at a name may listen at one of its addresses alone."""
+"""Numerical address: a host name could resolve to an address nobody listens on."""
 
 
 class CardError(grpc.RpcError):
-    """A driver's error as gRPC carries it."""
+    """Driver error in the form of a gRPC error."""
 
     def __init__(self, status: grpc.StatusCode, message: str, number: int | None = None) -> None:
         super().__init__(message)
@@ -39,6 +37,7 @@ class CardError(grpc.RpcError):
         return self._message
 
     def trailing_metadata(self) -> Any:
+        """Return the driver's error code where nidaqmx looks for it."""
         return [_Entry("ni-error", str(self._number))] if self._number is not None else []
 
 
@@ -48,10 +47,7 @@ class _Entry:
 
 
 class InProcess(grpc.Channel):
-    """A connection to a card in this process.
-
-    The client's messages are handed over as they are, unserialised.
-    """
+    """gRPC channel to a card in this process. Messages are passed on without serialisation."""
 
     def __init__(self, card: VirtualCard) -> None:
         self._card = card
@@ -59,6 +55,7 @@ class InProcess(grpc.Channel):
     def unary_unary(
         self, method: str, *_: Any, response_deserializer: Any = None, **__: Any
     ) -> Any:  # type: ignore[override]
+        # nidaqmx passes the bound method FromString: its owner is the class of the response.
         call, card, response = method.rsplit("/", 1)[1], self._card, response_deserializer.__self__
 
         def invoke(request: Message, **_: object) -> Message:
@@ -72,7 +69,7 @@ class InProcess(grpc.Channel):
         return invoke
 
     def unary_stream(self, *_: object, **__: object) -> Any:
-        """Events are not carried; a client that asks for them is told so when it does."""
+        """Refuse events, which the virtual card does not send."""
 
         def refuse(*_: object, **__: object) -> NoReturn:
             raise CardError(grpc.StatusCode.UNIMPLEMENTED, "the virtual card sends no events")
@@ -96,12 +93,11 @@ class InProcess(grpc.Channel):
 
 
 class _CallHandler(grpc.GenericRpcHandler):
-    """Every call of the service, found when it is made."""
+    """Handler of every call of the service, looked up by name."""
 
     def __init__(self, card: VirtualCard) -> None:
-        from nidaqmx._grpc_interpreter import (
-            grpc_types,  # only nidaqmx knows the messages of its service
-        )
+        # Only nidaqmx contains the compiled messages of NI's service.
+        from nidaqmx._grpc_interpreter import grpc_types
 
         self._card, self._messages = card, grpc_types
 
@@ -109,6 +105,7 @@ class _CallHandler(grpc.GenericRpcHandler):
         self, handler_call_details: grpc.HandlerCallDetails
     ) -> grpc.RpcMethodHandler | None:
         service, _, call = handler_call_details.method.strip("/").partition("/")
+        # Messages are named after their call: CreateTaskRequest, CreateTaskResponse.
         request, response = (
             getattr(self._messages, call + ending, None) for ending in ("Request", "Response")
         )
@@ -132,14 +129,24 @@ class _CallHandler(grpc.GenericRpcHandler):
 
 
 def serve(card: VirtualCard, port: int) -> tuple[grpc.Server, int]:
-    """Listens on this computer only; port 0 takes a free one.
+    """Serve a card on this computer only; port 0 selects a free port.
 
-    Returns the server and its port. Raises RigtwinError.
+    Returns
+    -------
+    tuple of server and int
+        The running server, and its port.
+
+    Raises
+    ------
+    RigtwinError
+        If the port is in use.
     """
+    # A refused call is an answer to the client, not an error of the server.
     logging.getLogger("grpc").setLevel(logging.CRITICAL)
     server = grpc.server(
         ThreadPoolExecutor(max_workers=8),
         handlers=[_CallHandler(card)],
+        # Without this, Linux lets two servers share a port, and calls reach either of them.
         options=(("grpc.so_reuseport", 0),),
     )
     try:
@@ -147,6 +154,6 @@ def serve(card: VirtualCard, port: int) -> tuple[grpc.Server, int]:
     except RuntimeError:
         bound = 0
     if bound == 0:
-        raise RigtwinError(f"port {port} is taken; name another")
+        raise RigtwinError(f"port {port} is in use; expected a free one")
     server.start()
     return server, bound

@@ -1,10 +1,8 @@
-"""A virtual PCI-6229.
+"""A virtual PCI-6229 that answers a client's NI-DAQmx calls, with the twin at its terminals.
 
-Answers the NI-DAQmx calls of a client, volts in and out, with the twin at its terminals.
-
-Reservations, ranges, names, the buffer of a clocked acquisition and the driver's error codes are
-those that NI documents, as far as a client such as `rigtwin.hardware.daq.card` meets them; any
-other call is refused by name.
+Reservations, ranges, names, the buffer of a clocked acquisition and the error codes are those that
+NI documents, as far as a client such as `rigtwin.hardware.daq.card` uses them. All other calls are
+refused by name.
 """
 
 from __future__ import annotations
@@ -23,25 +21,26 @@ from rigtwin.hardware.daq.wired import Wired
 from rigtwin.hardware.realtime import sleep_until
 from rigtwin.system import monotonic
 
+# Error codes of NI-DAQmx.
 NO_DEVICE, NO_CHANNEL, RESERVED, BAD_VALUE, OVERWRITTEN, TIMEOUT, NO_TASK, GONE = (
     -200220, -200170, -50103, -200077, -200279, -200284, -200088, -88705
 )  # fmt: skip
 PRODUCT = "PCI-6229"
 INPUT_RANGES = (0.2, 1.0, 5.0, 10.0)
-"""V, both ways; the outputs have 10 V only (NI 6229 specifications)."""
+"""Input ranges in V, in both directions. The outputs have 10 V only (NI 6229 specifications)."""
 BUFFERED = 1000
-"""Samples that a clocked acquisition keeps for a client that is late."""
+"""Number of samples that a clocked acquisition buffers for a late client."""
 _INITIALIZE, _ATTACH = 1, 2
-"""Session initialization behaviours of NI's session service."""
+"""Initialisation behaviours of NI's session service."""
 _SUPPORTED = 10_000.0
-"""Hz, the fastest sample clock that the twin is worth."""
+"""Fastest sample clock that the twin supports, in Hz."""
 
 Response = Callable[..., Message]
-"""Class of a call's response, made of its fields."""
+"""Class of a call's response, constructed from its fields."""
 
 
 class DriverError(Exception):
-    """An error as the driver gives it: code and message."""
+    """Error of the driver: code and message."""
 
     def __init__(self, code: int, message: str) -> None:
         super().__init__(message)
@@ -49,23 +48,23 @@ class DriverError(Exception):
 
 
 class OnDemand:
-    """Time of a card that nobody waits for: one period passes with each sample that is read."""
+    """Time of a card that waits for its reader: one period passes per sample read."""
 
     def begin(self) -> None: ...
 
     def next_tick(self, done: int) -> int:
-        """The tick of the sample that is asked for next."""
+        """Return the tick of the sample requested next."""
         return done + 1
 
     def now(self, done: int) -> int:
-        """Ticks that have passed by now."""
+        """Return the number of ticks that have passed."""
         return done
 
     def wait(self, tick: int) -> None: ...
 
 
 class RealTime:
-    """Time of a card whose clock runs."""
+    """Time of a card whose clock runs in real time."""
 
     def __init__(self, period: float) -> None:
         self._period, self._start = period, 0.0
@@ -80,7 +79,7 @@ class RealTime:
         return self.tick_at(monotonic())
 
     def tick_at(self, moment: float) -> int:
-        """The tick that a moment of `monotonic` lies in."""
+        """Return the tick at a time of `monotonic`, in s."""
         return int((moment - self._start) / self._period)
 
     def wait(self, tick: int) -> None:
@@ -88,6 +87,8 @@ class RealTime:
 
 
 class _Task:
+    """Task of the driver; `next` is the tick of the sample it reads next."""
+
     def __init__(self, name: str) -> None:
         self.name, self.lines, self.clocked, self.running, self.next = (
             name,
@@ -99,13 +100,27 @@ class _Task:
 
 
 class VirtualCard:
-    """One card.
+    """Virtual card. Its methods may be called from several threads.
 
-    Thread-safe. `answer` takes a call's name, its request, and the class of its response.
+    Before the first tick and after `disconnect` all outputs are zero.
 
-    tick: periods that have passed. outputs: volts at ao0 to ao3, shape (4,). power: the digital
-    line. Before the first tick and after `disconnect` all outputs are at zero. wiring: the card's
-    name, and which lines the terminals' signals are on.
+    Parameters
+    ----------
+    terminals
+        Rig at the card's terminals.
+    wiring
+        Name of the card, and lines of the terminals' signals.
+    time
+        Time of the card.
+
+    Attributes
+    ----------
+    tick
+        Number of periods that have passed.
+    outputs
+        Voltages at ao0 to ao3, shape (4,).
+    power
+        State of the digital line.
     """
 
     def __init__(
@@ -124,37 +139,40 @@ class VirtualCard:
         self._volts = np.zeros(len(self._outputs))
         self._places = [int(line[2:]) for line in self._outputs]
         self._tasks: dict[str, _Task] = {}
+        # A ring of the latest samples; the oldest are overwritten as on the real card.
         self._samples: deque[list[float]] = deque(maxlen=BUFFERED)
+        # gRPC serves each call on a thread of its own.
         self._lock = threading.RLock()
         self._begun = False
 
     def answer(self, call: str, request: Message, response: Response) -> Message:
-        """Answers a call.
+        """Answer a call.
 
         Parameters
         ----------
         call : str
-            Its name in NI's gRPC service.
+            Name of the call in NI's gRPC service.
         request : Message
-            What it asks.
+            Request of the call.
         response : Response
-            What its answer is made with.
+            Class of the response.
 
         Returns
         -------
         Message
-            The answer.
+            Response to the request.
 
         Raises
         ------
         DriverError
-            As the driver would.
+            If the driver would refuse the call.
         RigtwinError
-            For a call that no client of this project makes.
+            If the virtual card does not implement the call.
         """
         handler = getattr(self, f"_{call}", None)
         if handler is None:
             raise RigtwinError(f"the virtual card does not know the call {call}")
+        # The wait is outside the lock, so that others may write while a reader waits.
         if call == "ReadAnalogF64":
             self._await(request)
         with self._lock:
@@ -168,12 +186,12 @@ class VirtualCard:
             return handler(request, response)
 
     def disconnect(self) -> None:
-        """The cable is pulled: the outputs' terminals are at zero and nothing answers any more."""
+        """Pull the cable: the outputs drop to zero, and no call is answered any more."""
         self.connected, self.power = False, False
         self.outputs[:] = 0.0
 
     def run_until(self, tick: int) -> None:
-        """Lets time pass with the outputs held, whether or not anybody reads."""
+        """Let time pass with the outputs held, whether or not anybody reads."""
         with self._lock:
             while self.tick < tick:
                 self._step()
@@ -185,6 +203,7 @@ class VirtualCard:
         self._samples.append(self._terminals.volts.tolist())
 
     def _catch_up(self) -> None:
+        """Advance the rig to the present; time begins with the first call."""
         if not self._begun:
             self._begun = True
             self._time.begin()
@@ -192,7 +211,7 @@ class VirtualCard:
         self.run_until(self._time.now(self.tick))
 
     def _await(self, request: Message) -> None:
-        """Outside the lock: others may write while a reader waits for its sample."""
+        """Wait until the requested samples exist."""
         if request.num_samps_per_chan > BUFFERED:
             raise DriverError(
                 BAD_VALUE,
@@ -203,7 +222,8 @@ class VirtualCard:
         if task is not None and task.running and task.clocked and self._begun:
             self._time.wait(task.next + max(request.num_samps_per_chan, 1) - 1)
 
-    # The calls, by their names in the gRPC service.
+    # One method per call of NI's gRPC service, with the service's name of the call. Attributes are
+    # identified by the numbers of NI's header file NIDAQmx.h.
 
     def _task(self, request: Message) -> _Task:
         task = self._tasks.get(request.task.name)
@@ -212,6 +232,7 @@ class VirtualCard:
         return task
 
     def _GetSystemInfoAttributeUInt32(self, request: Message, response: Response) -> Message:
+        # Major and minor version of the driver.
         return response(value={0x1272: 26, 0x1923: 5}.get(request.attribute_raw, 0))
 
     def _GetSystemInfoAttributeString(self, _: Message, response: Response) -> Message:
@@ -227,6 +248,7 @@ class VirtualCard:
         if request.attribute_raw == 0x0631:
             return response(value=PRODUCT)
         return response(
+            # The driver returns lists as one text.
             value=", ".join(
                 f"{self._device}/{line}" for line in lists.get(request.attribute_raw, [])
             )
@@ -250,6 +272,7 @@ class VirtualCard:
             raise DriverError(NO_DEVICE, f"Device identifier is invalid. Device specified: {name}")
 
     def _ResetDevice(self, request: Message, response: Response) -> Message:
+        # A reset ends all tasks and sets the outputs to zero.
         self._require_device(request.device_name)
         self._tasks.clear()
         self.outputs[:] = 0.0
@@ -258,6 +281,7 @@ class VirtualCard:
 
     def _CreateTask(self, request: Message, response: Response) -> Message:
         name = request.session_name or f"_unnamedTask<{len(self._tasks)}>"
+        # INITIALIZE wants a new session, ATTACH an existing one.
         new = name not in self._tasks
         if new and request.initialization_behavior == _ATTACH:
             raise DriverError(NO_TASK, f"No session of the name {name} to attach to.")
@@ -273,6 +297,7 @@ class VirtualCard:
         return response(value=self._task(request).name)
 
     def _add(self, request: Message, text: str, kind: str, count: int) -> _Task:
+        """Add the channels named in a text to a task."""
         task = self._task(request)
         for line in text.split(","):
             device, _, name = line.strip().partition("/")
@@ -288,6 +313,8 @@ class VirtualCard:
         return task
 
     def _voltage(self, request: Message, allowed: tuple[float, ...]) -> None:
+        """Raise DriverError if the requested range exceeds the card's."""
+        # The driver takes any range up to the largest, and uses the next that covers it.
         if max(abs(request.min_val), abs(request.max_val)) > max(allowed):
             raise DriverError(
                 BAD_VALUE,
@@ -320,12 +347,13 @@ class VirtualCard:
 
     def _StartTask(self, request: Message, response: Response) -> Message:
         task = self._task(request)
-        for other in self._tasks.values():
-            both = set(other.lines) & set(task.lines)
-            if other is not task and other.running and both:
+        # As on the real card, a line belongs to one running task at a time.
+        for running in self._tasks.values():
+            both = set(running.lines) & set(task.lines)
+            if running is not task and running.running and both:
                 raise DriverError(
                     RESERVED,
-                    f"The specified resource is reserved. Task {other.name}, channel {min(both)}",
+                    f"The specified resource is reserved. Task {running.name}, channel {min(both)}",
                 )
         task.running, task.next = True, self.tick
         return response()
@@ -349,17 +377,20 @@ class VirtualCard:
         if task.clocked:
             if task.next + count - 1 > self.tick:
                 self.run_until(task.next + count - 1)
+            # The buffer holds the latest samples; a reader that is too late has lost its own.
             behind = self.tick - task.next
             if behind >= len(self._samples):
                 raise DriverError(
                     OVERWRITTEN, "Attempted to read samples that are no longer available."
                 )
             task.next += count
+        # On demand: the first reading shows the present, each later one the next tick.
         else:
             if task.next > 0:
                 self.run_until(self._time.next_tick(self.tick))
             task.next, behind, count = 1, 0, 1
         samples = [self._samples[-1 - behind + number] for number in range(count)]
+        # A channel without a signal reads 0 V, as an input that is shorted to ground.
         places = [self._inputs.index(line) if line in self._inputs else -1 for line in task.lines]
         values = [sample[place] if place >= 0 else 0.0 for place in places for sample in samples]
         return response(read_array=values, samps_per_chan_read=count)
@@ -372,6 +403,7 @@ class VirtualCard:
                 f"{len(request.write_array)} values written to {len(task.lines)} channels",
             )
         for line, volts in zip(task.lines, request.write_array, strict=True):
+            # Written so that NaN is refused.
             if not abs(volts) <= 10.0:
                 raise DriverError(
                     BAD_VALUE,
@@ -382,6 +414,7 @@ class VirtualCard:
 
     def _WriteDigitalLines(self, request: Message, response: Response) -> Message:
         task = self._task(request)
+        # Other digital lines exist, but nothing is connected to them.
         for line, level in zip(task.lines, request.write_array, strict=False):
             if line == self._power_line:
                 self.power = bool(level)

@@ -1,4 +1,4 @@
-"""A twin behind the converters of a channel table, without a card."""
+"""A twin behind the converters of a channel table, without a card in between."""
 
 from __future__ import annotations
 
@@ -13,31 +13,32 @@ from rigtwin.numerics.arrays import Array
 
 
 class Wired(Protocol):
-    """What is at a card's terminals. volts: at the inputs now, shape (inputs,)."""
+    """Interface of a rig at a card's terminals. `volts` are the inputs now, shape (inputs,)."""
 
     @property
     def volts(self) -> Array: ...
 
     def advance(self, written: Array, power: bool) -> None:
-        """One period under voltages that the outputs hold, shape (outputs,), with or without
-        power."""
+        """Advance by one period under held output voltages, shape (outputs,), and the power."""
         ...
 
 
 class WiredTwin:
-    """A `DrivenRig`: the twin behind the converters of a channel table."""
+    """A `DrivenRig`: a twin behind the converters of a channel table."""
 
     def __init__(self, terminals: Wired, table: ChannelTable) -> None:
         self._terminals, self._signals, self.missed = terminals, table.signals, 0
         self._inputs, self._outputs = conversion(table.inputs), conversion(table.outputs)
         count = len(table.outputs)
         self._values, self._commands = np.empty(len(table.inputs)), np.zeros(count)
+        # Before the first read the twin has not moved, and its sample is still fresh.
         self._held, self._power, self._fresh = np.zeros(count), False, True
 
     def start(self) -> None:
-        """Nothing to do: a twin stands where it was built."""
+        """Do nothing: a twin is ready when it is built."""
 
     def read(self) -> tuple[float, ...]:
+        """Advance by one period, and return the sample. The first call does not advance."""
         if not self._fresh:
             self._terminals.advance(self._held, self._power)
         self._fresh = False
@@ -52,7 +53,7 @@ class WiredTwin:
         self._power = on
 
     def stop(self) -> None:
-        """Forces to zero, power off."""
+        """Set forces to zero, and switch the power off."""
         self._commands[:] = 0.0
         to_volts(self._outputs, self._commands, self._commands)
         places = self._signals.released_places
@@ -60,7 +61,7 @@ class WiredTwin:
 
 
 class InRealTime:
-    """A twin that is read in real time: a `DrivenRig` around another."""
+    """A `DrivenRig` that reads a twin in real time."""
 
     def __init__(self, rig: WiredTwin, period: float) -> None:
         self._rig, self._pacer, self.missed, self.late = rig, Pacer(period), 0, 0.0
@@ -70,6 +71,7 @@ class InRealTime:
 
     def read(self) -> tuple[float, ...]:
         self.missed, self.late = self._pacer.wait(), self._pacer.late
+        # Time passes for the twin in missed ticks too: those samples are read and dropped.
         for _ in range(self.missed):
             self._rig.read()
         return self._rig.read()

@@ -1,1 +1,1 @@
-"""Faults put into a session on the virtual card: is the rig stopped in time and rightly?"""
+"""Fault injection: sessions with a fault on the virtual card, which must stop the rig in time."""

@@ -1,4 +1,4 @@
-"""The twin at the card's terminals with a fault in cable or actuator, and a log of its motion."""
+"""Twin at the card's terminals with a fault in cable or actuator, and a log of its true motion."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from rigtwin.hardware.daq.terminals import Terminals
 from rigtwin.numerics.arrays import Array
 
 SEEN_LVDT, SEEN_FORCE = 0.03, 150.0
-"""m and N by which a reading must be wrong before a fault counts as one: three times what noise,
+"""Errors of a reading, in m and N, from which a fault counts as visible: three times what noise,
 tyre and friction explain."""
 SEEN_CYLINDER = 0.06
-"""m by which a cylinder must be off its command: what a fast test asks of a good one is two thirds
-of it."""
+"""Error of a cylinder, in m, from which a fault counts as visible. A fast test reaches two thirds
+of it with a healthy cylinder."""
 
 
 class FaultyBench:
@@ -25,31 +25,31 @@ class FaultyBench:
     Parameters
     ----------
     terminals : Terminals
-        The healthy rig.
+        Healthy rig.
     table : ChannelTable
-        By which volts are read.
+        Channel table by which volts are read.
     kind : str
-        A name of KINDS, or empty.
+        Name of a fault in `KINDS`; empty for none.
     at : int
-        Tick from which the fault holds.
+        Tick at which the fault begins.
     place : int
-        Input or output that has it.
+        Index of the faulty input or output.
     seed : int
-        Of the fault's own chance.
+        Seed of the fault's random numbers.
     ticks : int
-        How many are logged.
+        Number of ticks that are logged.
 
     Attributes
     ----------
     tick : int
-        Periods that have passed.
+        Number of periods that have passed.
     shown : int
-        First tick at which the fault is there to be seen, or −1.
+        First tick at which the fault is visible, or −1.
     volts : Array
-        At the inputs, shape (4,).
+        Voltages at the inputs, shape (4,).
     written, pressure, truth : Array
-        The log: volts of shape (ticks, 3), whether there was pressure, and true measurements of
-        shape (ticks, 4).
+        Log of the session: output voltages, shape (ticks, 3), presence of pressure, shape
+        (ticks,), and true measurements, shape (ticks, 4).
     """
 
     def __init__(
@@ -75,7 +75,7 @@ class FaultyBench:
         self._read, self._true = np.empty(4), np.empty(4)
 
     def advance(self, written: Array, power: bool) -> None:
-        """Advances by one period under the outputs' volts, shape (3,)."""
+        """Advance by one period under output voltages, shape (3,)."""
         if self.tick < len(self.written):
             self.written[self.tick], self.pressure[self.tick] = written, power
         acting = written.copy()
@@ -91,6 +91,7 @@ class FaultyBench:
             self._sense()
 
     def _actuate(self, acting: Array) -> None:
+        """Apply a fault of an actuator to the voltages that act."""
         place = self._place
         if self._kind == "amplifier dead":
             self._show(abs(acting[2]) * MOTOR_CONSTANT > SEEN_FORCE)
@@ -100,12 +101,14 @@ class FaultyBench:
                 self._held = float(acting[place])
             self._show(abs((acting[place] - self._held) * self._factor[place]) > SEEN_CYLINDER)
             acting[place] = self._held
+        # An open valve drives the cylinder at full voltage, in either direction.
         elif self._kind == "valve open":
             acting[place] = 10.0 * self._direction
             asked = self.written[min(self.tick, len(self.written) - 1), place] * self._factor[place]
             self._show(abs(self._terminals.truth[place] - asked) > SEEN_CYLINDER)
 
     def _sense(self) -> None:
+        """Apply a fault of a sensor to the voltages at the inputs."""
         kind, place, volts = self._kind, self._place, self.volts
         span = self._ranges[place]
         first = self.tick == self._at
@@ -113,9 +116,11 @@ class FaultyBench:
             volts[place] = 0.0
             self._show(not first)
         elif kind == "stuck":
+            # The value of the tick before is repeated for good.
             volts[place] = self._before[place]
             self._show(True)
         elif kind == "spike" and first:
+            # A spike lasts one tick and hits anywhere within the range.
             volts[place] += self._direction * span * self._random.uniform(0.1, 0.9)
         elif kind == "not a number":
             volts[place] = np.nan
@@ -129,21 +134,23 @@ class FaultyBench:
             volts[place] = self._random.uniform(-span, span)
         to_values(self._inputs, volts, self._read)
         to_values(self._inputs, self._terminals.volts, self._true)
+        # Written so that a reading of NaN counts as visible.
         self._show(
             not abs(self._read[place] - self._true[place])
             <= (SEEN_FORCE if place == 3 else SEEN_LVDT)
         )
 
-    def _show(self, there: bool) -> None:
-        if there and self.shown < 0:
+    def _show(self, visible: bool) -> None:
+        if visible and self.shown < 0:
             self.shown = self.tick
 
     def find_safe_tick(self) -> int:
-        """Finds the first tick from which the outputs are safe.
+        """Return the first tick from which the outputs are safe.
 
-        The motor's is zero for good, the cylinders' are held or without pressure.
+        The motor's voltage is zero for good, and the cylinders are held or without pressure.
         """
         last = min(self.tick, len(self.written))
+        # Safe is the state after the last voltage of the motor and the last motion under pressure.
         motor = np.flatnonzero(np.abs(self.written[:last, 2]) > 0.0)
         moving = (
             np.any(np.diff(self.written[:last, :2], axis=0) != 0.0, axis=1) & self.pressure[1:last]
@@ -152,7 +159,7 @@ class FaultyBench:
         return int(max(motor[-1] + 1 if len(motor) else 0, changes[-1] if len(changes) else 0))
 
     def peak_share(self, limits: Safety, since: int) -> float:
-        """Finds the greatest true position, travel or force from a tick on, in its limit."""
+        """Return the largest true position, travel or force relative to its limit, since a tick."""
         last = min(self.tick, len(self.truth))
         bounds = np.array([limits.ground, limits.structure, limits.travel, limits.force])
         return float(np.max(np.abs(self.truth[since:last]) / bounds)) if last > since else 0.0

@@ -1,4 +1,4 @@
-"""Many sessions on the virtual card, each with one fault at a random time, and their results."""
+"""Campaign of sessions on the virtual card, where each has one fault at a random time."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from rigtwin.hardware.daq.virtual import BAD_VALUE, DriverError, OnDemand, Respo
 from rigtwin.hardware.faults.bench import FaultyBench
 from rigtwin.hardware.faults.kinds import KINDS, SIGNALS, FaultKind
 from rigtwin.hardware.rig_operation import ARMED, LOOKING, SETTLING, Update
-from rigtwin.hardware.session.own_controller import OwnController
-from rigtwin.hardware.session.record import record_at_leisure
+from rigtwin.hardware.session.custom_controller import CustomController
+from rigtwin.hardware.session.record import record_unpaced
 from rigtwin.hardware.session.stops import stop_requests
 from rigtwin.hardware.session.test import Test
 from rigtwin.recording import load
@@ -30,34 +30,35 @@ from rigtwin.simulation.experiment import Experiment
 from rigtwin.system import STOP_SIGNALS, limit_files, raise_signal
 
 EXPERIMENTS = ("drop", "road1.6", "semi-active", "imposed", "imposed-fast")
-"""Model in the loop and imposed tests alike."""
+"""Experiments of the campaign, both model-in-the-loop and imposed tests."""
 DURATION = 3.0
-"""s of each test; a fault comes at a random time of the ramp or the test."""
+"""Duration of each test, in s. The fault comes at a random time of the ramp or the test."""
 RAMP = 0.6
-"""s."""
+"""Duration of the ramp, in s."""
 BEFORE = round(1000.0 * (LOOKING + ARMED + RAMP + SETTLING))
-"""Ticks of the card before the test."""
+"""Number of ticks of the card before the test."""
 SOON = 600
+"""Number of ticks after the start within which a fault of a process comes."""
 SLOW = 5
-"""Ticks that pass during a slow one."""
+"""Number of ticks that pass during a slow one."""
 
 
 @dataclass(frozen=True)
-class Fault:
-    """What is put into one session.
+class InjectedFault:
+    """Fault of one session.
 
     Parameters
     ----------
     kind : FaultKind
-        What breaks.
+        Kind of the fault.
     experiment : str
-        Name of the test.
+        Name of the experiment.
     at : int
-        Tick of the card from which it is there.
+        Tick of the card at which the fault begins.
     place : int
-        Input or output that has it.
+        Index of the faulty input or output.
     seed : int
-        Of the demands, the sensors' noise and the fault's own chance.
+        Seed of the demands, of the sensors' noise, and of the fault's random numbers.
     """
 
     kind: FaultKind
@@ -69,28 +70,28 @@ class Fault:
 
 @dataclass(frozen=True)
 class FaultResult:
-    """What became of a session with a fault.
+    """Result of a session with a fault.
 
     Parameters
     ----------
-    fault : Fault
-        What was put into it.
+    fault : InjectedFault
+        Fault of the session.
     late : int or None
-        Ticks from when the fault could be seen to safe outputs; None if it never could and the
-        test was completed.
+        Number of ticks from the fault's first visibility to safe outputs. None if it never became
+        visible and the test was completed.
     from_start : int
-        Ticks from the fault to safe outputs.
+        Number of ticks from the fault to safe outputs.
     exceeded : float
-        Greatest true position, travel or force, as a share of its limit.
+        Largest true position, travel or force, relative to its limit.
     cause, reason : str
-        As the recording says.
+        Cause and reason of the end in the recording.
     right : bool
-        Whether they name the fault.
+        Whether cause and reason name the fault.
     readable : bool
-        Whether the recording can be read to its last tick.
+        Whether the recording can be read up to its last tick.
     """
 
-    fault: Fault
+    fault: InjectedFault
     late: int | None
     from_start: int
     exceeded: float
@@ -101,60 +102,61 @@ class FaultResult:
 
     @property
     def ok(self) -> bool:
-        """Whether the session was stopped as it must be."""
+        """Whether the rig stopped within 5 ticks and 1.1 times every limit, for the true cause."""
         in_time = self.late is None or self.late <= 5
         return in_time and self.exceeded <= 1.1 and self.right and self.readable
 
 
-def draw_faults(count: int, seed: int, kinds: Sequence[FaultKind] = KINDS) -> list[Fault]:
-    """Draws faults: the kinds in turn, everything else at random.
+def draw_faults(count: int, seed: int, kinds: Sequence[FaultKind] = KINDS) -> list[InjectedFault]:
+    """Draw faults: the kinds in turn, everything else at random.
 
     Parameters
     ----------
     count : int
-        How many.
+        Number of faults.
     seed : int
-        Same seed, same faults.
+        Seed of the draw; equal seeds give equal faults.
     kinds : sequence of FaultKind
-        From which they are taken.
+        Kinds that faults are drawn from.
 
     Returns
     -------
-    list of Fault
-        In the order of the kinds.
+    list of InjectedFault
+        Faults in the order of the kinds.
     """
     random = np.random.default_rng(seed)
     moving, ending = 1000.0 * (LOOKING + ARMED), BEFORE + 1000.0 * DURATION
     faults = []
     for number in range(count):
+        # The kinds take turns, so that each is tried equally often.
         kind = kinds[number % len(kinds)]
         place = int(random.integers(4)) if kind.place == "sensor" else int(random.integers(2))
         experiment = EXPERIMENTS[int(random.integers(len(EXPERIMENTS)))]
         of_controller = kind.place in ("controller", "loop") or kind.name == "controller hangs"
         first = BEFORE if of_controller else moving
-        # A process on a slowed card takes its time: its faults come in the ramp or soon after.
+        # A process on a slowed card takes long, so its faults come in the ramp or soon after.
         last = min(ending, BEFORE + SOON) if kind.place == "process" else ending
         at = int(random.uniform(first + 20.0, last - 50.0))
-        faults.append(Fault(kind, experiment, at, place, int(random.integers(2**31))))
+        faults.append(InjectedFault(kind, experiment, at, place, int(random.integers(2**31))))
     return faults
 
 
-def plan_test(fault: Fault, experiment: Experiment, table: ChannelTable) -> Test:
-    """Gives the session that is to have a fault.
+def plan_test(fault: InjectedFault, experiment: Experiment, table: ChannelTable) -> Test:
+    """Return the session that is to have a fault.
 
     Parameters
     ----------
     fault : Fault
-        Its seed is the session's.
+        Fault, whose seed is also the session's.
     experiment : Experiment
-        The one that the fault names.
+        Experiment that the fault names.
     table : ChannelTable
-        Of the virtual card.
+        Channel table of the virtual card.
 
     Returns
     -------
     Test
-        The experiment cut to DURATION and RAMP.
+        Experiment shortened to DURATION and RAMP.
     """
     changes = {"timing": {"duration": DURATION}, "safety": {"ramp": RAMP}}
     configuration = override(experiment.configuration, changes)
@@ -163,12 +165,12 @@ def plan_test(fault: Fault, experiment: Experiment, table: ChannelTable) -> Test
 
 
 def count_card_ticks(test: Test) -> int:
-    """Counts the ticks that a session may take, and some more."""
+    """Return an upper bound on the ticks of a session."""
     return len(test.demands) + 4000
 
 
 class _GlitchingCard(VirtualCard):
-    """Refuses an output once, or is disconnected, when its time has come."""
+    """Virtual card that refuses an output once, or is disconnected, at a given tick."""
 
     glitch: tuple[str, int] = ("", 0)
 
@@ -184,40 +186,40 @@ class _GlitchingCard(VirtualCard):
 
 
 def try_fault(
-    fault: Fault,
+    fault: InjectedFault,
     experiment: Experiment,
     table: ChannelTable,
     folder: Path,
-    own: OwnController | None = None,
+    controller: CustomController | None = None,
 ) -> FaultResult:
-    """Runs a session with one fault in this process.
+    """Run a session with one fault in this process.
 
     Parameters
     ----------
-    fault : Fault
-        Of any place but a process.
+    fault : InjectedFault
+        Fault of any place but a process.
     experiment : Experiment
-        The one that the fault names.
+        Experiment that the fault names.
     table : ChannelTable
-        Of the virtual card.
+        Channel table of the virtual card.
     folder : Path
-        Where the recording goes.
-    own : OwnController, optional
-        One's own instead of the rig's.
+        Folder of the recording.
+    controller : CustomController, optional
+        Controller in place of the rig's.
 
     Returns
     -------
     FaultResult
-        What became of it.
+        Result of the session.
 
     Raises
     ------
     RigtwinError
-        Only if the session could not even begin.
+        If the session could not begin.
     KeyboardInterrupt
-        If an operator ended it who is none of the fault.
+        If a real operator ended the campaign.
     """
-    test = replace(plan_test(fault, experiment, table), own=own)
+    test = replace(plan_test(fault, experiment, table), controller=controller)
     period, name = test.configuration.timing.period, fault.kind.name
     bench = FaultyBench(
         test.terminals(),
@@ -231,37 +233,24 @@ def try_fault(
     virtual = _GlitchingCard(bench, table, OnDemand())
     if fault.kind.place == "card":
         virtual.glitch = (name, fault.at)
+    # Time is the virtual card's, so results do not depend on this computer's speed.
     card = Card(table, period, InProcess(virtual), clock=lambda: virtual.tick * period)
     path, stop_file = folder / f"{fault.seed}.mcap", folder / f"{fault.seed}.stop"
     interrupted: list[str] = []
     with _full_disk(path) as fill, stop_requests(stop_file) as find_request:
-
-        def stop() -> str | None:
-            asked = find_request()
-            if asked is not None and (fault.kind.place != "operator" or virtual.tick < fault.at):
-                # Somebody at the keyboard, who means the campaign and not this session.
-                interrupted.append(asked)
-                return asked
-            if virtual.tick >= fault.at:
-                if name == "operator's signal" and virtual.tick == fault.at:
-                    raise_signal(STOP_SIGNALS[fault.seed % 3])
-                elif name == "operator's file":
-                    stop_file.touch()
-                elif name == "full disk":
-                    fill()
-            return find_request()
+        stop = _make_stop(fault, virtual, stop_file, fill, find_request, interrupted)
 
         def show_full_disk(_: int) -> None:
             if name == "full disk" and virtual.tick >= fault.at and bench.shown < 0:
                 bench.shown = virtual.tick
 
-        fails = fault.kind.place in ("controller", "loop")
         updating = test.updating()
-        if fails:
+        if fault.kind.place in ("controller", "loop"):
             updating = _make_failing_update(fault, virtual, updating)
         try:
-            record_at_leisure(card, test, path, stop, show_full_disk, test.operation(updating))
+            record_unpaced(card, test, path, stop, show_full_disk, test.operation(updating))
         except RigtwinError:
+            # An interruption before the rig was armed is an error of the session, not of the fault.
             if not interrupted:
                 raise
     stop_file.unlink(missing_ok=True)
@@ -270,11 +259,40 @@ def try_fault(
     return judge(fault, test, bench, path)
 
 
-def _make_failing_update(fault: Fault, card: VirtualCard, healthy: Update) -> Update:
-    """Makes a controller, or the loop around it, fail in its time.
+def _make_stop(
+    fault: InjectedFault,
+    card: VirtualCard,
+    stop_file: Path,
+    fill: Callable[[], None],
+    find_request: Callable[[], str | None],
+    interrupted: list[str],
+) -> Callable[[], str | None]:
+    """Return the session's stop function, which also injects faults of operator and disk.
 
-    Before the test at its first tick.
+    A request that is not the fault's comes from a real operator; it is added to `interrupted`.
     """
+    name = fault.kind.name
+
+    def stop() -> str | None:
+        asked = find_request()
+        if asked is not None and (fault.kind.place != "operator" or card.tick < fault.at):
+            # A real operator wants to end the campaign, not only this session.
+            interrupted.append(asked)
+            return asked
+        if card.tick >= fault.at:
+            if name == "operator's signal" and card.tick == fault.at:
+                raise_signal(STOP_SIGNALS[fault.seed % 3])
+            elif name == "operator's file":
+                stop_file.touch()
+            elif name == "full disk":
+                fill()
+        return find_request()
+
+    return stop
+
+
+def _make_failing_update(fault: InjectedFault, card: VirtualCard, healthy: Update) -> Update:
+    """Return an update function of a controller, or of its loop, that fails from a tick on."""
 
     def update(
         controlling: Controller, state: State, measured: Measurements, demand: Demand
@@ -290,6 +308,7 @@ def _make_failing_update(fault: Fault, card: VirtualCard, healthy: Update) -> Up
             if fault.place == 0:
                 return state, commands._replace(structure=commands.structure + 0.05)
             return state, commands._replace(voltage=commands.voltage - 11.0)
+        # Time passes on the card as if the loop had been busy.
         card.run_until(card.tick + SLOW)
         return state, commands
 
@@ -298,35 +317,39 @@ def _make_failing_update(fault: Fault, card: VirtualCard, healthy: Update) -> Up
 
 @contextmanager
 def _full_disk(path: Path) -> Iterator[Callable[[], None]]:
-    """Gives a function after which the system lets no file grow any more."""
+    """Provide a function after which the system lets no file grow."""
     with limit_files() as limit:
         yield lambda: limit(path.stat().st_size)
 
 
-def judge(fault: Fault, test: Test, bench: FaultyBench, path: Path) -> FaultResult:
-    """Judges a session by the log of its terminals and by its recording.
+def judge(fault: InjectedFault, test: Test, bench: FaultyBench, path: Path) -> FaultResult:
+    """Judge a session by the log at its terminals and by its recording.
 
     Parameters
     ----------
     fault : Fault
-        What was put into it.
+        Fault of the session.
     test : Test
-        What was run.
+        Test of the session.
     bench : FaultyBench
-        The terminals.
+        Terminals with the log.
     path : Path
-        The recording.
+        Path of the recording.
 
     Returns
     -------
     FaultResult
-        Its numbers in ticks of the card.
+        Result, with times in ticks of the card.
     """
-    cause, reason = last_words(path)
+    cause, reason = read_final_cause(path)
     safe = bench.find_safe_tick()
+    # A fault may never show, such as a stuck valve that nobody asks to move: then the test must
+    # have been completed.
     harmless = cause == "completed"
     shown = fault.at if fault.kind.everywhere else bench.shown
+    # A fault that never showed and did no harm has no delay.
     late = None if harmless and shown < 0 else safe - (shown if shown >= 0 else safe)
+    # A sensor's fault must be blamed on the right sensor, not only on the right cause.
     named = (
         fault.kind.place != "sensor"
         or cause not in ("jump", "stuck", "not_a_number")
@@ -346,19 +369,20 @@ def judge(fault: Fault, test: Test, bench: FaultyBench, path: Path) -> FaultResu
     )
 
 
-def last_words(path: Path) -> tuple[str, str]:
-    """Reads cause and reason of a recording's last transition, empty where it has none."""
-    found = transitions(path)
-    return (found[-1]["cause"], found[-1]["reason"]) if found else ("", "")
+def read_final_cause(path: Path) -> tuple[str, str]:
+    """Return cause and reason of a recording's last transition; empty texts if it has none."""
+    last = transitions(path)
+    return (last[-1]["cause"], last[-1]["reason"]) if last else ("", "")
 
 
 def is_readable(path: Path) -> bool:
-    """Says whether a recording can be read as far as it goes.
+    """Return whether a recording can be read as far as it goes.
 
-    One that ended before the test began has nothing but its states.
+    A recording that ended before the test began contains only transitions.
     """
     try:
         recording = load(path)
     except RigtwinError as error:
-        return "no ticks" in str(error) and bool(last_words(path)[0])
+        return "no ticks" in str(error) and bool(read_final_cause(path)[0])
+    # Reading must also give usable times.
     return bool(np.all(np.isfinite(recording.time)))

@@ -1,10 +1,11 @@
-"""The kinds of fault, each defined once: what breaks, where, and which causes name it rightly."""
+"""Kinds of fault: what breaks, where, and which causes name it correctly."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 SIGNALS = ("ground_lvdt", "structure_lvdt", "suspension_lvdt", "load_cell")
+# A broken sensor first shows as a contradiction to another; which one depends on the motion.
 _IMPLAUSIBLE = (
     "jump",
     "wheel",
@@ -20,20 +21,20 @@ _IMPLAUSIBLE = (
 
 @dataclass(frozen=True)
 class FaultKind:
-    """One kind of fault.
+    """Kind of fault.
 
     Parameters
     ----------
     name : str
-        What it is called.
+        Name of the kind.
     place : str
-        Sensor, actuator, controller, loop, card, recording, operator or process.
+        Place: sensor, actuator, controller, loop, card, recording, operator or process.
     meaning : str
-        What breaks, in words.
+        Description of what breaks.
     causes : tuple of str
-        Names of the supervisor's causes that are right.
+        Names of the supervisor's causes that are correct.
     everywhere : bool
-        Whether it shows at once, whatever the rig does.
+        Whether the fault shows at once, whatever the rig does.
     """
 
     name: str
@@ -100,5 +101,5 @@ KINDS = (
     FaultKind("process frozen", "process", "SIGSTOP", ("process",)),
     FaultKind("controller hangs", "process", "a tick never ends", ("process",)),
 )
-"""All of them. Those of a process need two processes and a card between them; the others run in
-one."""
+"""All kinds. Faults of a process need two processes with a card in between; all others run in one
+process."""

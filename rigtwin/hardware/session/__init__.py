@@ -1,4 +1,1 @@
-"""A test on the rig from the dry run to the recording.
-
-Who keeps it, who watches, how the operator stops it.
-"""
+"""Session on the rig: dry run, permission, recording, guardian, and the operator's stop."""

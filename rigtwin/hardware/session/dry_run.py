@@ -1,7 +1,4 @@
-"""The dry run: the exact session on the virtual card first.
-
-What it predicts, and the list of what has passed.
-"""
+"""List of dry runs: sessions that completed on the virtual card before they run on the rig."""
 
 from __future__ import annotations
 
@@ -15,46 +12,51 @@ from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq.table import ChannelTable, to_toml
 
 
-def digest(told: str, configuration: Configuration, demands: bytes, table: ChannelTable) -> str:
-    """Computes a key of all that makes a session another one.
+def digest(title: str, configuration: Configuration, demands: bytes, table: ChannelTable) -> str:
+    """Return a key that identifies a session.
 
     Parameters
     ----------
-    told : str
-        The experiment's name, and what else is told of it in words.
+    title : str
+        Name of the experiment, and the identity of a custom controller.
     configuration : Configuration
-        Every setting.
+        All settings.
     demands : bytes
-        What is demanded.
+        Demands of the test.
     table : ChannelTable
-        Of the card.
+        Channel table of the card.
 
     Returns
     -------
     str
-        SHA-256, in hexadecimal.
+        SHA-256 digest in hexadecimal.
     """
-    known = json.dumps([told, flatten(configuration), to_toml(table)], sort_keys=True)
+    # Sorted keys make the digest independent of the order of settings.
+    known = json.dumps([title, flatten(configuration), to_toml(table)], sort_keys=True)
     return hashlib.sha256(known.encode() + demands).hexdigest()
 
 
 def ledger(card: Path) -> Path:
-    """Where the dry runs of a card are listed: beside its channel table."""
+    """Return the path of a card's list of dry runs, beside its channel table."""
     return card.with_suffix(".dry-runs.json")
 
 
 def has_passed(card: Path, key: str) -> bool:
-    """Whether that session has had a dry run which completed.
+    """Return whether a session has completed a dry run.
 
-    Raises RigtwinError for a list that cannot be read.
+    Raises
+    ------
+    RigtwinError
+        If the list cannot be read.
     """
     return key in _entries(ledger(card))
 
 
-def enter(card: Path, key: str, entry: Mapping[str, str]) -> None:
-    """Adds a dry run that completed. Raises RigtwinError."""
+def add_dry_run(card: Path, key: str, entry: Mapping[str, str]) -> None:
+    """Add a completed dry run to the list. Raise RigtwinError if it cannot be written."""
     path = ledger(card)
     entries = {**_entries(path), key: dict(entry)}
+    # The list is replaced as a whole, so that a crash leaves the old one intact.
     temporary = path.with_suffix(".json.new")
     try:
         temporary.write_text(json.dumps(entries, indent=1) + "\n", encoding="utf-8")
@@ -64,6 +66,7 @@ def enter(card: Path, key: str, entry: Mapping[str, str]) -> None:
 
 
 def _entries(path: Path) -> dict[str, dict[str, str]]:
+    """Return the list of dry runs by key; empty if the file does not exist."""
     if not path.exists():
         return {}
     try:

@@ -1,6 +1,6 @@
-"""The loop's side of a second process that keeps the recording and guards the rig.
+"""Client of the guardian: a second process that writes the recording and guards the rig.
 
-If the loop dies or hangs, the guardian stops the rig and says so in the recording.
+If the loop dies or hangs, the guardian stops the rig and notes the cause in the recording.
 """
 
 from __future__ import annotations
@@ -27,32 +27,41 @@ from rigtwin.hardware.session.guardian_settings import (
     split_memory,
 )
 from rigtwin.hardware.supervisor import Transition
-from rigtwin.interruptions import held_back
+from rigtwin.interruptions import block_sigint
 from rigtwin.system import monotonic
 
 STARTED = 30.0
-"""s within which the guardian must be there."""
+"""Time within which the guardian must start, in s."""
 ABSENT = 1.0
-"""s after which a guardian that does not look any more is missed."""
+"""Time without a sign of life after which the guardian counts as lost, in s."""
 
 
 class Guardian:
-    """The loop's side: a `Recorder` of a session whose work another process does."""
+    """A `Recorder` of a session whose work is done by another process."""
 
     def __init__(self, settings: GuardianSettings) -> None:
-        """Raises RigtwinError if the recording cannot be written or the process does not come."""
+        """Start the guardian.
+
+        Raises
+        ------
+        RigtwinError
+            If the recording cannot be written, or the process does not start.
+        """
         self._settings, self._finishing = settings, False
         self.fault: str | None = None
         context = multiprocessing.get_context("spawn")
         layout = settings.layout
         memory = context.RawArray("d", memory_size(layout))
         self._shared, self._ring = split_memory(memory, layout)
+        # Rare messages use the pipe; ticks use shared memory, which costs no system call.
         self._pipe, theirs = context.Pipe()
         arguments = (settings, theirs, memory, os.getpid())
         self._process = context.Process(target=guard, args=arguments, name="rigtwin guardian")
         try:
-            with held_back():
+            # Ctrl-C reaches every process of a terminal; the guardian must outlive it.
+            with block_sigint():
                 self._process.start()
+            # Only the guardian holds its end now, so that its death shows as an end of file.
             theirs.close()
             if not self._pipe.poll(STARTED):
                 raise RigtwinError("the guardian process does not start")
@@ -65,28 +74,32 @@ class Guardian:
         threading.Thread(target=self._listen, daemon=True).start()
 
     def beat(self, outputs: Sequence[float]) -> None:
-        """Tells that the loop is alive, and which outputs are safe; sees whether the guardian
-        is."""
+        """Show that the loop is alive, note which outputs are safe, and check the guardian."""
         shared, now = self._shared, monotonic()
+        # The safe outputs are written before the time: a guardian that acts on the time finds them.
         shared[SAFE:], shared[BEAT] = outputs, now
         if now - shared[ALIVE] > ABSENT:
             self.fault = self.fault or "the guardian process does not answer any more"
 
     def tick(self, row: tuple[float, ...]) -> None:
-        """Hands over one tick; see `Recorder`."""
+        """Hand over one tick; see `Recorder`."""
         written = int(self._shared[WRITTEN])
         if written - self._shared[READ] >= RING:
+            # The ring is full. Waiting would stop the loop, overwriting would lose ticks.
             self.fault = self.fault or "the recording cannot keep up with the loop"
             return
         self._ring[written % RING] = row
+        # The counter is raised after the row is complete: the reader never sees half a row.
         self._shared[WRITTEN] = written + 1.0
 
     def flush(self) -> None:
-        """The other process writes by itself."""
+        """Do nothing: the guardian writes continuously."""
 
     def ready(self) -> None:
-        """Waits until the guardian could stop the rig. Raises RigtwinError if it cannot."""
+        """Wait until the guardian could stop the rig. Raise RigtwinError if it cannot."""
+        # Attaching takes long, and is possible only after the loop has opened its tasks.
         self._send("prepare")
+        # The flag is polled: the guardian sets it in shared memory.
         end = monotonic() + STARTED
         while self._shared[PREPARED] == 0.0 and self.fault is None and monotonic() < end:
             time.sleep(1e-3)
@@ -94,20 +107,23 @@ class Guardian:
             raise RigtwinError(self.fault or "the guardian process does not answer")
 
     def transition(self, transition: Transition) -> None:
-        """Has a transition recorded; the loop is guarded from arming to rest."""
+        """Record a transition; guard the loop from arming to rest."""
         if transition.after in self._settings.phases and self._shared[GUARDED] == 0.0:
+            # A fresh beat before guarding begins: the last one may be older than the patience.
             self._shared[BEAT] = monotonic()
             self._shared[GUARDED] = 1.0
         self._send("transition", transition)
+        # Guarding ends after the transition is sent: the guardian must know that the rig is at
+        # rest.
         if transition.after not in self._settings.phases:
             self._shared[GUARDED] = 0.0
 
     def add_metadata(self, name: str, values: dict[str, str]) -> None:
-        """Has a metadata record added."""
+        """Add a metadata record."""
         self._send("metadata", name, values)
 
     def finish(self, reason: str) -> None:
-        """Ends the recording and the other process."""
+        """End the recording and the guardian."""
         self._shared[GUARDED], self._finishing = 0.0, True
         self._send("finish", reason)
         self._process.join(STARTED if self.fault is None else ABSENT)
@@ -120,12 +136,14 @@ class Guardian:
             self.fault = self.fault or "the guardian process is gone, and the recording with it"
 
     def _answer(self) -> object:
+        """Return the guardian's next message; None after its end."""
         try:
             return self._pipe.recv()
         except (EOFError, OSError):
             return None
 
     def _listen(self) -> None:
+        """Take every message of the guardian as a fault, until it ends."""
         while (said := self._answer()) is not None:
             self.fault = str(said)
         if self.fault is None and not self._finishing:

@@ -1,4 +1,4 @@
-"""What the loop and its guardian share: the guardian's settings, and the memory of the ticks."""
+"""Data shared by the loop and its guardian: the guardian's settings, and the memory for ticks."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigtwin.hardware.daq.table import ChannelTable
-from rigtwin.hardware.session.recorder import Layout
+from rigtwin.hardware.session.recorder import TickLayout
 from rigtwin.hardware.supervisor import Phase
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Writer
@@ -17,52 +17,60 @@ from rigtwin.recording import Writer
 SharedMemory = ctypes.Array[ctypes.c_double]
 
 RING = 8192
-"""Ticks that the shared memory holds for the recording: seconds of them."""
+"""Number of ticks that the shared memory holds: several seconds."""
 BEAT, GUARDED, WRITTEN, READ, PREPARED, ALIVE, SAFE = range(7)
-"""Numbers in the shared memory, before the ticks: time of the last tick, whether there is anything
-to guard, ticks written by the loop and read by the guardian, whether it could stop the rig, when it
-last looked; then the outputs that are safe."""
+"""Indices of the numbers before the ticks in shared memory: time of the last tick, whether the loop
+is guarded, ticks written by the loop, ticks read by the guardian, whether the guardian could stop
+the rig, time of its last check. The safe outputs follow. Each number has one writer, and a double
+is written at once, so no lock is needed."""
 
 
-def memory_size(layout: Layout) -> int:
-    """How many numbers there are."""
+def memory_size(layout: TickLayout) -> int:
+    """Return the number of doubles in shared memory."""
     return SAFE + layout.outputs + RING * layout.row
 
 
-def split_memory(memory: SharedMemory, layout: Layout) -> tuple[Array, Array]:
-    """Gives views of the numbers before the ticks, shape (SAFE + outputs,), and of the ring of
-    ticks, shape (RING, numbers)."""
+def split_memory(memory: SharedMemory, layout: TickLayout) -> tuple[Array, Array]:
+    """Return views of the shared memory.
+
+    Returns
+    -------
+    tuple of two arrays
+        Numbers before the ticks, shape (SAFE + outputs,), and the ring of ticks, shape
+        (RING, numbers per tick).
+    """
+    # Views share the memory; nothing is copied.
     whole, first = np.frombuffer(memoryview(memory)), SAFE + layout.outputs
     return whole[:first], whole[first:].reshape(RING, layout.row)
 
 
 @dataclass(frozen=True)
 class GuardianSettings:
-    """What the guardian has to know.
+    """Settings of the guardian.
 
     Parameters
     ----------
     open_writer : callable
-        Opens the recording; picklable.
+        Function that opens the recording; picklable.
     metadata : dict
-        Records added at once.
-    layout : Layout
-        Of the ticks.
+        Metadata records added at the start.
+    layout : TickLayout
+        Layout of a tick.
     table : ChannelTable or None
-        Of the card; None for a rig that needs no stopping.
+        Channel table of the card; None for a rig that needs no stopping.
     patience : float
-        s without a tick before the guardian acts.
+        Time without a tick after which the guardian acts, in s.
     hold : float
-        s before it takes the power off.
+        Time before the guardian switches the power off, in s.
     live : int
-        Port of a live view on this computer, 0 for none.
+        Port of a live view on this computer; 0 for none.
     phases : tuple of Phase
-        Those in which the loop is guarded.
+        Phases in which the loop is guarded.
     """
 
     open_writer: Callable[[], Writer]
     metadata: dict[str, dict[str, str]]
-    layout: Layout
+    layout: TickLayout
     table: ChannelTable | None
     patience: float
     hold: float

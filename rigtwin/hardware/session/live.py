@@ -1,4 +1,4 @@
-"""A live view of a session for Foxglove, served on this computer only."""
+"""Live view of a session for Foxglove, served on this computer only."""
 
 from __future__ import annotations
 
@@ -11,14 +11,28 @@ from rigtwin.recording.schema import descriptor, encode, type_name
 
 HOST = "127.0.0.1"
 SHOWN = 10
-"""Every so many ticks one is shown."""
+"""Interval of the ticks that are shown."""
 
 
 def open_live_view(port: int, fields: Mapping[str, Sequence[str]]) -> Callable[[str, Array], None]:
-    """Starts serving; returns what takes rows of a topic whose first column is the time in s.
-    fields: of each topic.
+    """Start serving a live view.
 
-    Raises RigtwinError.
+    Parameters
+    ----------
+    port
+        Port on this computer.
+    fields
+        Topic → names of its fields.
+
+    Returns
+    -------
+    callable
+        Function that shows rows of a topic. The first column of a row is the time in s.
+
+    Raises
+    ------
+    RigtwinError
+        If the package is missing or the port is in use.
     """
     try:
         import foxglove
@@ -33,6 +47,7 @@ def open_live_view(port: int, fields: Mapping[str, Sequence[str]]) -> Callable[[
     channels: dict[str, Any] = {"server": server}
 
     def show(topic: str, rows: Array) -> None:
+        # A topic is announced with its first rows, because not every session has every topic.
         if topic not in channels:
             schema = foxglove.Schema(
                 name=type_name(topic),

@@ -1,5 +1,4 @@
-"""Whether a test may be run on the rig: a table that somebody answers for, a card that is there,
-and a dry run of just this session."""
+"""Permission to run a test on the rig: a trusted channel table, a card, and a matching dry run."""
 
 from __future__ import annotations
 
@@ -17,35 +16,46 @@ from rigtwin.hardware.session.test import AnyTest
 
 @dataclass(frozen=True)
 class Permission:
-    """card: on which nothing has moved yet; notes: what the recording has to say of it."""
+    """Permission to run a test.
+
+    Attributes
+    ----------
+    card
+        Card on which nothing has moved yet.
+    notes
+        Metadata records that the recording must contain.
+    """
 
     card: Card
     notes: tuple[tuple[str, dict[str, str]], ...]
 
 
 def key_of(test: AnyTest) -> str:
-    """By which a dry run of just this session is known."""
-    told = test.experiment if test.own is None else f"{test.experiment} by {test.own.told}"
-    return digest(told, test.configuration, test.list_demands(), test.table)
+    """Return the key by which dry runs of a session are listed."""
+    title = test.experiment
+    if test.controller is not None:
+        title = f"{title} by {test.controller.identity}"
+    return digest(title, test.configuration, test.list_demands(), test.table)
 
 
 def require_permission(test: AnyTest, card: Path, without_dry_run: str | None) -> Permission:
-    """What a test needs to be run on the rig.
+    """Return the permission to run a test on the rig.
 
     Parameters
     ----------
     test
-        The session.
+        Test of the session.
     card
-        Its channel table; dry runs are listed beside it.
+        Path of the channel table. The list of dry runs is beside it.
     without_dry_run
-        Who answers for leaving the dry run out, if it is.
+        Name of the person who takes responsibility for a missing dry run; None to require one.
 
     Raises
     ------
     RigtwinError
         If the test must not be run.
     """
+    # Checks go from cheap to expensive; opening the card comes last, when all else is in order.
     if test.effects:
         raise RigtwinError("--effect is the twin's; the rig has its own")
     require_trust(test.table, date.today())
@@ -54,6 +64,7 @@ def require_permission(test: AnyTest, card: Path, without_dry_run: str | None) -
     opened = open_card(test)
     if has_passed(card, key_of(test)):
         return Permission(opened, ())
+    # A missing dry run is possible, but somebody's name stands for it in the recording.
     if not without_dry_run:
         raise RigtwinError(
             f"{test.experiment} with these settings has had no dry run; do it first: "
@@ -65,7 +76,7 @@ def require_permission(test: AnyTest, card: Path, without_dry_run: str | None) -
 
 
 def list_obstacles(test: AnyTest) -> tuple[str, ...]:
-    """What would keep a test off the machine besides its dry run, a line each."""
+    """Return what prevents a test on the machine besides a missing dry run, one per line."""
     lacking = list_doubts(test.table, date.today())
     for look in (test.require_limits, lambda: open_card(test)):
         try:

@@ -1,4 +1,4 @@
-"""A list of tests to be recorded one after the other, and what is there of it already."""
+"""Plan: a list of tests to be recorded one after another, of which some may exist already."""
 
 from __future__ import annotations
 
@@ -12,25 +12,25 @@ from rigtwin.recording import load
 from rigtwin.simulation.experiment import Experiment
 
 LONGEST = 3600.0
-"""s of a pause."""
+"""Longest pause, in s."""
 KEYS = ("experiment", "name", "seed", "pause", "set")
 
 
 @dataclass(frozen=True)
 class PlannedTest:
-    """One test of a list.
+    """One test of a plan.
 
     Parameters
     ----------
-    name : str
+        Name of the recording without its suffix.
         Of its recording, without the ending.
-    experiment : str
+        Name of the experiment.
         What is run.
-    seed : int
+        Seed of the demands.
         Of the demands.
-    pause : float
+        Pause before the test, in s.
         s before it.
-    settings : list of str
+        Settings `key=value`, as --set takes them.
         `key=value` texts, as --set takes them.
     """
 
@@ -42,31 +42,31 @@ class PlannedTest:
 
     @property
     def changes(self) -> list[dict[str, dict[str, str]]]:
-        """The settings, group → name → value, one after the other. Raises RigtwinError."""
+        """Settings as group → name → value, one by one. Raises RigtwinError for a wrong text."""
         return list(parse_assignments(self.settings))
 
 
 def parse_plan(
     tables: Mapping[str, object], find: Callable[[str], Experiment]
 ) -> list[PlannedTest]:
-    """Reads the tests of a list.
+    """Parse the tests of a plan.
 
     Parameters
     ----------
     tables : mapping
-        TOML's tables: `test`, a list of tables.
+        TOML tables; `test` is a list of tables.
     find : callable
-        Gives the experiment of a name; raises RigtwinError if there is none.
+        Function that returns an experiment by name, or raises RigtwinError.
 
     Returns
     -------
     list of PlannedTest
-        In the order of the list.
+        Tests in the order of the list.
 
     Raises
     ------
     RigtwinError
-        Naming the test and what is wrong with it.
+        If a test is wrong; the message names it and the mistake.
     """
     unknown = [name for name in tables if name != "test"]
     if unknown:
@@ -74,15 +74,16 @@ def parse_plan(
     tests = tables.get("test")
     if not isinstance(tests, list) or not tests:
         raise RigtwinError("no [[test]] in it")
-    found: list[PlannedTest] = []
+    plan: list[PlannedTest] = []
     for number, table in enumerate(tests, start=1):
         test = _parse_test(number, table, find)
-        if test.name in (other.name for other in found):
+        # Two tests of one name would overwrite each other's recording.
+        if test.name in (earlier.name for earlier in plan):
             raise RigtwinError(
                 f"test {number}: name {test.name!r} is another test's; expected one of its own"
             )
-        found.append(test)
-    return found
+        plan.append(test)
+    return plan
 
 
 def _parse_test(number: int, table: object, find: Callable[[str], Experiment]) -> PlannedTest:
@@ -91,10 +92,11 @@ def _parse_test(number: int, table: object, find: Callable[[str], Experiment]) -
         raise RigtwinError(f"{where} = {table!r}; expected a table, [[test]]")
     for key in table:
         if key not in KEYS:
-            raise RigtwinError(f"{where}: unknown {key!r}; there are {', '.join(KEYS)}")
+            raise RigtwinError(f"{where}: unknown {key!r}; expected {', '.join(KEYS)}")
     experiment, seed, pause = table.get("experiment"), table.get("seed", 0), table.get("pause", 0.0)
     if not isinstance(experiment, str):
         raise RigtwinError(f"{where}: experiment is missing")
+    # Raises an error for an unknown experiment.
     find(experiment)
     if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
         raise RigtwinError(f"{where}: seed = {seed!r}; expected 0 or more")
@@ -118,7 +120,7 @@ def _is_file_name(name: str) -> bool:
 
 
 def list_assignments(settings: Mapping[str, object]) -> list[str]:
-    """Gives `group.name=value` texts of nested or dotted tables."""
+    """Return nested or dotted tables as texts `group.name=value`."""
     lines: list[str] = []
     for key, value in settings.items():
         if isinstance(value, Mapping):
@@ -129,19 +131,19 @@ def list_assignments(settings: Mapping[str, object]) -> list[str]:
 
 
 def is_complete(path: Path, real: bool) -> bool:
-    """Says whether a test need not be done again.
+    """Return whether a test need not be repeated.
 
     Parameters
     ----------
     path : Path
-        Where its recording is, or would be.
+        Path of the recording, which may not exist.
     real : bool
-        Whether the recording must be of the rig itself, else of a twin.
+        Whether a recording of the rig itself is required, instead of one of a twin.
 
     Returns
     -------
     bool
-        True if it is there and completed.
+        True if the recording exists and was completed.
     """
     if not path.exists():
         return False
@@ -149,14 +151,16 @@ def is_complete(path: Path, real: bool) -> bool:
         recording = load(path)
     except RigtwinError:
         return False
+    # A dry run's recording does not replace a test on the rig, nor the reverse.
     return recording.end == "completed" and real == (not recording.twin)
 
 
 def move_aside(path: Path) -> Path | None:
-    """Keeps a recording of a test that did not complete under another name, which it returns."""
+    """Rename the recording of an incomplete test, and return its new path."""
     if not path.exists():
         return None
     number = 1
+    # Earlier attempts are kept, each under its own number.
     while (aside := path.with_suffix(f".{number}.mcap")).exists():
         number += 1
     return path.rename(aside)

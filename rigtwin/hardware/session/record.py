@@ -1,7 +1,4 @@
-"""Records a supervised session.
-
-On the card, on its virtual copy, or on the twin behind the card's converters.
-"""
+"""Recording of a supervised session on the card, its virtual copy, or the twin behind it."""
 
 from __future__ import annotations
 
@@ -20,7 +17,7 @@ from rigtwin.hardware.operation import Operation
 from rigtwin.hardware.realtime import Lateness, Pacer, describe_grants, in_real_time
 from rigtwin.hardware.session.guardian import Guardian
 from rigtwin.hardware.session.guardian_settings import GuardianSettings
-from rigtwin.hardware.session.recorder import Keeper
+from rigtwin.hardware.session.recorder import SessionRecorder
 from rigtwin.hardware.session.test import AnyTest
 from rigtwin.hardware.supervision import SessionEnd, supervise
 from rigtwin.recording import Writer, twin_values
@@ -28,32 +25,33 @@ from rigtwin.recording.schema import CARD_RECORD, LATENESS_RECORD, TWIN_RECORD
 from rigtwin.simulation.rig import DrivenRig
 
 LONGEST = 1.0
-"""s that a guardian waits for a tick at most, however many may be missed."""
+"""Longest time a guardian waits for a tick, in s, however many ticks may be missed."""
 
 
 def open_virtual_card(test: AnyTest, terminals: Wired | None = None) -> tuple[Card, VirtualCard]:
-    """Opens a virtual card in this process, behind the unmodified nidaqmx client.
+    """Open a virtual card in this process, behind the unmodified nidaqmx client.
 
     Parameters
     ----------
     test : AnyTest
-        Its period, table and, by default, twin.
+        Test whose period, table and, by default, twin are used.
     terminals : Wired, optional
-        What the card is wired to.
+        Rig at the card's terminals.
 
     Returns
     -------
     tuple of Card and VirtualCard
-        The rig, and the card behind it.
+        Client's card, and the virtual card behind it.
 
     Raises
     ------
     RigtwinError
-        If the client is missing or a limit does not fit the card.
+        If the client is missing, or a limit exceeds a line's range.
     """
     require_client()
     from rigtwin.hardware.daq.transport import InProcess
 
+    # The clock of the client's card is the virtual card's: it advances with each sample.
     period = test.period
     virtual = VirtualCard(terminals or test.terminals(), test.table, OnDemand())
     card = Card(test.table, period, InProcess(virtual), clock=lambda: virtual.tick * period)
@@ -62,16 +60,16 @@ def open_virtual_card(test: AnyTest, terminals: Wired | None = None) -> tuple[Ca
 
 
 def metadata(test: AnyTest, virtual: bool) -> dict[str, dict[str, str]]:
-    """Says what a recording holds beyond the test: the channel table, and how a twin made it."""
-    told = {CARD_RECORD: {"table": to_toml(test.table)}}
+    """Return the metadata of a recording: the channel table, and how a twin made it."""
+    records = {CARD_RECORD: {"table": to_toml(test.table)}}
     if virtual:
         settings = flatten(test.configuration)
-        told[TWIN_RECORD] = twin_values(test.seed, settings, test.effects, __version__)
-    return told
+        records[TWIN_RECORD] = twin_values(test.seed, settings, test.effects, __version__)
+    return records
 
 
 def _writer_of(path: Path, test: AnyTest) -> Callable[[], Writer]:
-    """What opens the recording, here or in another process."""
+    """Return a picklable function that opens the recording in this or another process."""
     return partial(
         Writer,
         path,
@@ -84,7 +82,7 @@ def _writer_of(path: Path, test: AnyTest) -> Callable[[], Writer]:
     )
 
 
-def record_at_leisure(
+def record_unpaced(
     rig: DrivenRig,
     test: AnyTest,
     path: Path,
@@ -92,40 +90,41 @@ def record_at_leisure(
     progress: Callable[[int], object] = lambda _: None,
     operation: Operation | None = None,
 ) -> SessionEnd:
-    """Records on a twin whose time waits for the loop, as fast as it goes.
+    """Record on a twin whose time waits for the loop, as fast as possible.
 
     Parameters
     ----------
     rig : DrivenRig
-        The twin, or a virtual card.
+        Twin or virtual card.
     test : AnyTest
-        What is to be done.
+        Test of the session.
     path : Path
-        Of the recording.
+        Path of the recording.
     stop : callable
-        Called in every tick; a text stops the session and is its reason.
+        Function called in every tick; a text it returns stops the session and is the reason.
     progress : callable
-        Called with the ticks done since its last call.
+        Function called with the number of ticks since its last call.
     operation : Operation, optional
-        The test's by default.
+        Operation of the test. Defaults to the test's own.
 
     Returns
     -------
     SessionEnd
-        How it ended.
+        End of the session.
 
     Raises
     ------
     RigtwinError
-        Before anything is recorded.
+        If the session cannot begin; nothing is recorded then.
     """
     operation = operation or test.operation()
     with _writer_of(path, test)() as writer:
+        # Space is reserved first, so that a full disk cannot prevent the last records.
         writer.reserve()
         for name, values in metadata(test, virtual=True).items():
             writer.add_metadata(name, values)
-        keeper = Keeper(writer, test.layout)
-        ended = supervise(rig, operation, keeper, stop, progress=progress)
+        recorder = SessionRecorder(writer, test.layout)
+        ended = supervise(rig, operation, recorder, stop, progress=progress)
         writer.finish(ended.cause.reason)
     return ended
 
@@ -137,33 +136,34 @@ def guardian_settings(
     notes: Sequence[tuple[str, dict[str, str]]] = (),
     live: int = 0,
 ) -> GuardianSettings:
-    """Gives what a guardian has to know of a test.
+    """Return the guardian's settings for a test.
 
     Parameters
     ----------
     test : AnyTest
-        What is to be done.
+        Test of the session.
     path : Path
-        Of the recording.
+        Path of the recording.
     guarded : bool
-        Whether the rig is a card that the guardian has to stop.
+        Whether the rig is a card that the guardian must be able to stop.
     notes : sequence of (str, dict)
-        More metadata records.
+        Further metadata records.
     live : int
-        Port of a live view, 0 for none.
+        Port of a live view; 0 for none.
 
     Returns
     -------
     GuardianSettings
-        Picklable.
+        Settings, which are picklable.
     """
     operation = test.operation()
-    # The last tick that may be late comes `missed` + 1 periods after the one before, and a bit.
+    # The last tick that may be late comes `missed` + 1 periods after its predecessor; half a period
+    # is added for jitter.
     patience = min((operation.missed + 1.5) * test.period, LONGEST)
-    told = metadata(test, virtual=not guarded) | dict(notes)
+    records = metadata(test, virtual=not guarded) | dict(notes)
     return GuardianSettings(
         _writer_of(path, test),
-        metadata=told,
+        metadata=records,
         layout=test.layout,
         table=test.table if guarded else None,
         patience=patience,
@@ -183,48 +183,51 @@ def record_in_real_time(
     progress: Callable[[int], object] = lambda _: None,
     fifo: bool = True,
 ) -> SessionEnd:
-    """Records in real time, with a guardian process.
+    """Record in real time, with a guardian process.
 
     Parameters
     ----------
     rig : DrivenRig
-        The card, or a twin in real time.
+        Card, or twin in real time.
     test : AnyTest
-        What is to be done.
+        Test of the session.
     path : Path
-        Of the recording.
+        Path of the recording.
     stop : callable
-        Called in every tick; a text stops the session and is its reason.
+        Function called in every tick; a text it returns stops the session and is the reason.
     guarded : bool
-        Whether the rig is a card that the guardian has to stop if this process dies.
+        Whether the rig is a card that the guardian must stop if this process dies.
     notes : sequence of (str, dict)
-        More metadata records.
+        Further metadata records.
     live : int
-        Port of a live view, 0 for none.
+        Port of a live view; 0 for none.
     progress : callable
-        Called with the ticks done since its last call.
+        Function called with the number of ticks since its last call.
     fifo : bool
-        Whether to ask for the scheduling class of real time.
+        Whether to request real-time scheduling.
 
     Returns
     -------
     SessionEnd
-        How it ended.
+        End of the session.
 
     Raises
     ------
     RigtwinError
-        Before anything moves.
+        If the session cannot begin; nothing has moved then.
     """
     operation = test.operation()
     course = operation.course
+    # Upper bound on the ticks, with a second to spare: the statistics' memory must not grow later.
     whole = operation.ticks + round(2.0 * (course.ramp + course.hold + 1.0) / operation.period)
     lateness = Lateness(whole)
+    # The guardian starts before this process takes real-time priority, which it would inherit.
     guardian = Guardian(guardian_settings(test, path, guarded, notes, live))
     with ExitStack() as stack:
         grants = stack.enter_context(in_real_time(fifo))
         try:
             ended = supervise(rig, operation, guardian, stop, lateness, progress)
+        # The guardian must not outlive the session, whatever ended it.
         except BaseException as error:
             guardian.finish(f"not run: {' '.join(str(error).split())}")
             raise
@@ -234,9 +237,10 @@ def record_in_real_time(
 
 
 def open_card(test: AnyTest) -> Card:
-    """Opens the card itself and inspects it. Raises CardFault; moves nothing."""
+    """Open the card and inspect it. Raise CardFault; nothing moves."""
     period = test.period
     channel = connect(test.table.address)
+    # A card without its own clock is paced by this computer.
     pacer = Pacer(period) if test.table.timing == "software" else None
     card = Card(test.table, period, channel, pacer=pacer)
     card.inspect()

@@ -1,4 +1,4 @@
-"""Keeps a session in a recording, in the process that runs it."""
+"""Recorder of a session in the process that runs it."""
 
 from __future__ import annotations
 
@@ -21,20 +21,21 @@ SESSION = "/session"
 
 
 @dataclass(frozen=True)
-class Layout:
-    """How the numbers of a tick lie, as a `rigtwin.hardware.supervision.Recorder` gets them: those
-    of /session, commands, the tick's number in the test.
+class TickLayout:
+    """Layout of a tick's numbers in the row that a `rigtwin.hardware.supervision.Recorder` gets.
+
+    A row has the fields of /session, the commands, and the tick's number in the test.
 
     Parameters
     ----------
     session : tuple of str
         Fields of /session.
     topics : dict
-        Topic → its fields in a recording, each with the place of its number.
+        Topic → fields of the recording → index in the row.
     number : int
-        Place of the tick's number.
+        Index of the tick's number.
     outputs : int
-        How many are written to the card.
+        Number of outputs on the card.
     """
 
     session: tuple[str, ...]
@@ -44,7 +45,7 @@ class Layout:
 
     @property
     def row(self) -> int:
-        """Numbers of a tick."""
+        """Length of a row."""
         return self.number + 1
 
     @property
@@ -53,58 +54,61 @@ class Layout:
         return {SESSION: self.session, **{name: tuple(at) for name, at in self.topics.items()}}
 
 
-def layout_of(signals: Signals, given: Sequence[Channel] = ()) -> Layout:
-    """That of a machine. given: what is demanded besides its outputs."""
+def layout_of(signals: Signals, demanded: Sequence[Channel] = ()) -> TickLayout:
+    """Return the layout of a machine; `demanded` are channels that are no outputs of the card."""
     inputs, outputs = signals.inputs, signals.outputs
     session = ("time", "phase", *(s.name for s in outputs), signals.power)
     first = len(session)
     session = (*session, *(s.name for s in inputs), "late", "missed")
     topics: dict[str, dict[str, int]] = {}
     if signals == RIG:
-        told = [("/command", name) for name in Commands._fields]
+        commands = [("/command", name) for name in Commands._fields]
     else:
-        told = [*(s.channel for s in outputs), *given]
-    for place, (topic, name) in enumerate(told):
+        commands = [*(s.channel for s in outputs), *demanded]
+    for place, (topic, name) in enumerate(commands):
         topics.setdefault(topic, {})[name] = len(session) + place
+    # Sensors are stored once in a row; /session and the sensors' own topics share the numbers.
     for place, signal in enumerate(inputs):
         topics.setdefault(signal.channel[0], {})[signal.channel[1]] = first + place
-    return Layout(session, topics, len(session) + len(told), len(outputs))
+    return TickLayout(session, topics, len(session) + len(commands), len(outputs))
 
 
 RIG_LAYOUT = layout_of(RIG)
 assert RIG_LAYOUT.session == topic_fields(SESSION)
 
 
-class Keeper:
+class SessionRecorder:
     """A `rigtwin.hardware.supervision.Recorder` that writes block by block.
 
-    What cannot be written is no exception but a `fault`: the rig has to be stopped first.
+    A failed write is stored as `fault` instead of raised, because the rig must be stopped first.
     """
 
-    def __init__(self, writer: Writer, layout: Layout) -> None:
+    def __init__(self, writer: Writer, layout: TickLayout) -> None:
         self._writer, self._layout = writer, layout
         self.fault: str | None = None
-        self._rows, self._kept = np.empty((BLOCK, layout.row)), 0
+        self._rows, self._count = np.empty((BLOCK, layout.row)), 0
         self._places = {
             topic.strip("/"): list(fields.values()) for topic, fields in layout.topics.items()
         }
 
     def tick(self, row: tuple[float, ...]) -> None:
-        self._rows[self._kept] = row
-        self._kept += 1
-        if self._kept == BLOCK:
+        self._rows[self._count] = row
+        self._count += 1
+        if self._count == BLOCK:
             self.flush()
 
     def flush(self) -> None:
-        rows = self._rows[: self._kept]
-        self._kept = 0
+        """Write the ticks that have not filled a block."""
+        rows = self._rows[: self._count]
+        self._count = 0
         self.block(rows)
 
     def block(self, rows: Array) -> None:
-        """Consecutive ticks, shape (ticks, numbers)."""
+        """Write consecutive ticks, shape (ticks, numbers)."""
         if self.fault is not None or not len(rows):
             return
         number = self._layout.number
+        # Ticks of ramps have no number in the test: only /session contains them.
         tested = rows[np.isfinite(rows[:, number])]
         if len(tested):
             topics = {topic: tested[:, places] for topic, places in self._places.items()}
@@ -113,14 +117,14 @@ class Keeper:
         self._try(lambda: self._writer.append_beside(SESSION, session, session[:, 0]))
 
     def transition(self, transition: Transition) -> None:
-        """Also when nothing else can be written any more: the writer has kept room for it."""
+        """Write a transition, even on a full disk: the writer has reserved space for it."""
         self._try(lambda: self._writer.add_metadata(TRANSITION_RECORD, transition.record()))
 
     def ready(self) -> None:
-        """It is, since the writer is there."""
+        """Do nothing: the writer is open."""
 
     def beat(self, outputs: Sequence[float]) -> None:
-        """Nobody watches this process."""
+        """Do nothing: no process watches this one."""
 
     def _try(self, write: Callable[[], None]) -> None:
         try:

@@ -1,4 +1,4 @@
-"""How an operator stops a session at any time: a signal, a key, a file."""
+"""Stop requests of an operator: a signal, a key, or a file."""
 
 from __future__ import annotations
 
@@ -14,24 +14,25 @@ from rigtwin.system import STOP_SIGNALS, read_keys
 
 @contextmanager
 def stop_requests(file: Path | None = None) -> Iterator[Callable[[], str | None]]:
-    """Gives a function to be called once a tick: who asked to stop, or None.
+    """Provide a function that returns who asked to stop, or None; to be called once a tick.
 
-    Ctrl-C and the other signals that end a program are requests inside this context; on a terminal
-    so is any key; so is a file of that name.
+    Inside this context, Ctrl-C and other signals that end a program are requests. So are any key on
+    a terminal, and the existence of the file.
     """
-    said: list[str] = []
+    requests: list[str] = []
 
     def on_signal(number: int, _: FrameType | None) -> None:
-        said.append(f"stopped by the operator: {signal.Signals(number).name}")
+        requests.append(f"stopped by the operator: {signal.Signals(number).name}")
 
+    # A handler only takes a note: it may run between any two instructions of the loop.
     before = {number: signal.signal(number, on_signal) for number in STOP_SIGNALS}
     path = None if file is None else os.fspath(file)
     try:
         with read_keys() as key_pressed:
 
             def find_request() -> str | None:
-                if said:
-                    return said[0]
+                if requests:
+                    return requests[0]
                 if path is not None and os.path.exists(path):  # noqa: PTH110 - 1 us instead of 3, every tick
                     return f"stopped by the operator: file {path}"
                 if key_pressed is not None and key_pressed():
@@ -40,5 +41,6 @@ def stop_requests(file: Path | None = None) -> Iterator[Callable[[], str | None]
 
             yield find_request
     finally:
+        # The program's own handlers are restored, so that Ctrl-C ends it again.
         for number, handler in before.items():
             signal.signal(number, handler)

@@ -1,5 +1,4 @@
-"""The check that a channel table is true, on the card: what the inputs read at rest, and which of
-them follow each output."""
+"""Check of a channel table on the card: readings at rest, and responses of inputs to outputs."""
 
 from __future__ import annotations
 
@@ -14,7 +13,7 @@ from rigtwin.description.configuration import Configuration
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq.calibration import (
     FORCE,
-    Still,
+    RestReading,
     fit_responses,
     measure_rest,
     plan_bumps,
@@ -24,17 +23,17 @@ from rigtwin.hardware.daq.table import OUTPUTS, ChannelTable, Plausible
 from rigtwin.hardware.daq.terminals import Terminals
 from rigtwin.hardware.daq.virtual import OnDemand, VirtualCard
 from rigtwin.hardware.realtime import Pacer
-from rigtwin.hardware.session.record import record_at_leisure, record_in_real_time
+from rigtwin.hardware.session.record import record_in_real_time, record_unpaced
 from rigtwin.hardware.session.test import Test
 from rigtwin.hardware.supervisor import COMPLETED
 from rigtwin.recording import load
 
 LEAST_STROKE, MOST_STROKE = 0.001, 0.02
-"""m that a plate is moved to see its sign: well above noise, well within any rig."""
+"""Range of a plate's motion in a sign check, in m: well above noise, well within any rig."""
 
 
 def open_rig(table: ChannelTable, wiring: ChannelTable | None) -> Card:
-    """The card of a table, or a virtual one that is wired as `wiring` says. Raises RigtwinError."""
+    """Open a table's card, or a virtual one with another wiring. Raise RigtwinError if it fails."""
     period = Configuration().timing.period
     if wiring is None:
         card = Card(
@@ -53,13 +52,20 @@ def open_rig(table: ChannelTable, wiring: ChannelTable | None) -> Card:
     return card
 
 
-def look_at_rest(table: ChannelTable, wiring: ChannelTable | None) -> tuple[Still, ...]:
-    """What every input reads while nothing moves.
+def look_at_rest(table: ChannelTable, wiring: ChannelTable | None) -> tuple[RestReading, ...]:
+    """Return the readings of every input while nothing moves.
+
+    Parameters
+    ----------
+    table
+        Channel table of the card.
+    wiring
+        True meaning of a volt on a virtual card; None for the real card.
 
     Raises
     ------
     RigtwinError
-        If one gives the same reading again and again: stuck, or not connected.
+        If an input repeats one reading, because it is stuck or not connected.
     """
     rig = open_rig(table, wiring)
     try:
@@ -68,6 +74,7 @@ def look_at_rest(table: ChannelTable, wiring: ChannelTable | None) -> tuple[Stil
     finally:
         rig.stop()
     for signal in still:
+        # Noise makes every working sensor change from tick to tick.
         if signal.repeats >= table.plausible.stuck:
             raise RigtwinError(
                 f"{signal.name} gave {signal.repeats} times the same reading: "
@@ -82,22 +89,23 @@ def move_outputs(
     stroke: float,
     stop: Callable[[], str | None],
 ) -> dict[str, tuple[str, float, float]]:
-    """Moves every output a little, under supervision, one after the other.
+    """Move every output a little, one after another, under supervision.
 
     Parameters
     ----------
     table
-        As it is.
+        Channel table before the check.
     wiring
-        Of a virtual card in the rig's place; None of the rig itself.
+        True meaning of a volt on a virtual card; None for the real card.
     stroke
-        m, of the plates.
+        Motion of the plates, in m.
     stop
-        Gives a reason to end the motion.
+        Function that returns a reason to stop, or None.
 
     Returns
     -------
-    What each input does in answer to each output, as `fit_responses` has it.
+    dict
+        Responses of the inputs to the outputs, as `fit_responses` returns them.
 
     Raises
     ------
@@ -106,7 +114,7 @@ def move_outputs(
     """
     rig = open_rig(table, wiring)
     configuration, demands = plan_bumps(stroke, FORCE, Configuration().timing.period)
-    # Signals whose signs are unknown cannot be held against each other; each alone still can.
+    # Signals of unknown sign cannot be compared with each other; their own limits still hold.
     alone = replace(table, plausible=Plausible(stuck=table.plausible.stuck, wheel=1e9, motor=1e9))
     test = Test("sign check", configuration, demands, 0, alone)
     with TemporaryDirectory(prefix="rigtwin-check-") as folder:
@@ -114,10 +122,11 @@ def move_outputs(
         if wiring is None:
             ended = record_in_real_time(rig, test, path, stop, guarded=True)
         else:
-            ended = record_at_leisure(rig, test, path, stop)
+            ended = record_unpaced(rig, test, path, stop)
         if ended.cause != COMPLETED:
             raise RigtwinError(f"the check was stopped: {ended.cause.reason}")
         recording = load(path)
+    # A missed tick would shift the responses against the demands.
     if recording.ticks != len(demands):
         raise RigtwinError(
             f"{len(demands) - recording.ticks} ticks were missed; do it again, "
@@ -128,6 +137,6 @@ def move_outputs(
 
 
 def direction_of_wiring(output: str, table: ChannelTable, wiring: ChannelTable) -> int:
-    """Which way an output of a virtual card goes, for what the table says of it."""
+    """Return the direction, 1 or −1, in which an output of a virtual card moves."""
     place = OUTPUTS.index(output)
     return int(table.outputs[place].scaling.sign * wiring.outputs[place].scaling.sign)

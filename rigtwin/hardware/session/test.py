@@ -1,4 +1,4 @@
-"""What is to be done in a session: a test of the suspension rig, or of a described machine."""
+"""Tests of a session: a test of the suspension rig, or of a described machine."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from rigtwin.description.machine import OWN, Machine
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq.machine_terminals import MachineTerminals
 from rigtwin.hardware.daq.signals import reach_of
-from rigtwin.hardware.daq.table import Alive, ChannelTable, require_ranges, require_reach
+from rigtwin.hardware.daq.table import ChannelTable, StuckLimit, require_ranges, require_reach
 from rigtwin.hardware.daq.terminals import Terminals
 from rigtwin.hardware.machine_operation import MachineOperation
 from rigtwin.hardware.rig_operation import RigOperation, Update
-from rigtwin.hardware.session.own_controller import OwnController, OwnUpdate, make_own
-from rigtwin.hardware.session.recorder import RIG_LAYOUT, Layout, layout_of
+from rigtwin.hardware.session.custom_controller import CustomController, CustomUpdate, make_tick
+from rigtwin.hardware.session.recorder import RIG_LAYOUT, TickLayout, layout_of
 from rigtwin.models.commanding import Command, command_by_function
 from rigtwin.models.demands import check_demands, list_wanted
 from rigtwin.models.machine_twin import command_of
@@ -34,27 +34,27 @@ from rigtwin.simulation.peaks import Peak, peaks
 
 @dataclass(frozen=True)
 class Test:
-    """A test of the suspension rig.
+    """Test of the suspension rig.
 
     Parameters
     ----------
     experiment : str
-        Its name.
+        Name of the experiment.
     configuration : Configuration
-        Of rig, controller and clocks.
+        Settings of rig, controller and clocks.
     demands : Array
-        Columns of controllers.Demand, shape (ticks, 3).
+        Demands, shape (ticks, 3), in the order of `controllers.Demand`.
     seed : int
-        Of the twin's noise.
+        Seed of the twin's noise.
     table : ChannelTable
-        Of the card.
+        Channel table of the card.
     effects : sequence of str
-        Of the twin, as `--effect` takes them; none on a real rig.
-    own : OwnController, optional
-        One's own instead of the rig's.
+        Effects of the twin, as `--effect` takes them; empty on a real rig.
+    controller : CustomController, optional
+        Controller in place of the rig's.
     """
 
-    __test__ = False  # not one of pytest's
+    __test__ = False  # pytest would collect the class by its name
 
     experiment: str
     configuration: Configuration
@@ -62,7 +62,7 @@ class Test:
     seed: int
     table: ChannelTable
     effects: Sequence[str] = ()
-    own: OwnController | None = None
+    controller: CustomController | None = None
 
     machine_name = "suspension-rig"
     description = None
@@ -78,47 +78,49 @@ class Test:
 
     @property
     def controller_settings(self) -> dict[str, Any]:
-        """What a recording says of the controller: of one's own only where the test started."""
-        told: dict[str, Any] = flatten(self.configuration)["controller"]
-        if self.own is None:
-            return told
-        return {OWN: True, **{name: told[name] for name in ("start", "preload")}}
+        """Settings of the controller as recorded; of a user's, only where the test starts."""
+        settings: dict[str, Any] = flatten(self.configuration)["controller"]
+        if self.controller is None:
+            return settings
+        return {OWN: True, **{name: settings[name] for name in ("start", "preload")}}
 
     def updating(self) -> Update:
-        """The controller of one session."""
-        return update if self.own is None else OwnUpdate(self.own, self.configuration)
+        """Return the controller of one session."""
+        if self.controller is None:
+            return update
+        return CustomUpdate(self.controller, self.configuration)
 
     @property
     def card_configuration(self) -> Configuration:
-        """The configuration with the limits that the card's table adds.
+        """Configuration with the limits that the channel table adds.
 
         Raises
         ------
         RigtwinError
-            Where a limit does not fit the card's lines.
+            If a limit exceeds a line's range.
         """
         require_ranges(self.table, self.configuration.safety)
         return self.configuration._replace(safety=self.table.tighten(self.configuration.safety))
 
     def operation(self, updating: Update | None = None) -> RigOperation:
-        """The test for a session to run. updating: the controller; the test's by default."""
+        """Return the operation of the test. `updating` replaces the test's controller."""
         return RigOperation(self.card_configuration, self.demands, updating or self.updating())
 
     def terminals(self) -> Terminals:
-        """Builds the twin at the card's terminals, wired as the table says."""
+        """Build the twin at the card's terminals, wired as the table says."""
         return Terminals(
             apply_effects(self.configuration, list(self.effects)), self.table, self.seed
         )
 
     def list_demands(self) -> bytes:
-        """What is demanded, so that it is known again."""
+        """Return the demands as bytes, for a session's key."""
         return np.ascontiguousarray(self.demands).tobytes()
 
     def require_limits(self) -> None:
-        """The rig always has them."""
+        """Do nothing: the rig always has limits."""
 
     def predict_peaks(self, recording: Recording) -> tuple[Peak, ...]:
-        """How near to every limit a session came."""
+        """Return how near a session came to every limit."""
         commands, measurements = (
             np.column_stack([recording.column(topic, name) for name in names])
             for topic, names in (("/command", Commands._fields), ("/sensor", Measurements._fields))
@@ -128,16 +130,16 @@ class Test:
 
 @dataclass(frozen=True)
 class MachineTest:
-    """A test of a described machine.
+    """Test of a described machine.
 
     Parameters
     ----------
     machine : Machine
-        Its description.
-    experiment, configuration, seed, table, effects, own
-        As of a `Test`.
+        Machine under test.
+    experiment, configuration, seed, table, effects, controller
+        See `Test`.
     demands : mapping
-        What its experiment demands, by channel.
+        Demands of the experiment by channel.
     """
 
     machine: Machine
@@ -147,7 +149,7 @@ class MachineTest:
     seed: int
     table: ChannelTable
     effects: Sequence[str] = ()
-    own: OwnController | None = None
+    controller: CustomController | None = None
 
     @property
     def machine_name(self) -> str:
@@ -167,14 +169,14 @@ class MachineTest:
         return next((len(signal) for signal in self.demands.values()), self.configuration.ticks)
 
     @property
-    def layout(self) -> Layout:
+    def layout(self) -> TickLayout:
         demanded, _ = self._plan()
         written = [signal.channel for signal in self.table.signals.outputs]
         return layout_of(self.table.signals, [c for c in demanded if c not in written])
 
     def _plan(self) -> tuple[dict[tuple[str, str], Array], list[str]]:
-        """What is demanded of each channel, and actuators that a controller commands."""
-        wanted, outputs = list_wanted(self.machine, self.demands, self.own)
+        """Return the demand of each channel, and the actuators that a controller commands."""
+        wanted, outputs = list_wanted(self.machine, self.demands, self.controller)
         columns = check_demands(self.machine, wanted, self.demands)
         demanded = {
             (topic, name): signal
@@ -185,11 +187,14 @@ class MachineTest:
 
     @property
     def controller_settings(self) -> dict[str, Any]:
-        return {OWN: True} if self.own else flatten(self.configuration).get("controller", {})
+        if self.controller is not None:
+            return {OWN: True}
+        return flatten(self.configuration).get("controller", {})
 
     def operation(self) -> MachineOperation:
-        """The test for a session to run."""
+        """Return the operation of the test. Raise RigtwinError if a limit exceeds a line."""
         safety, signals = self.configuration.safety._asdict(), self.table.signals
+        # A line must carry the larger of both limits.
         limits = {
             s.name: (f"safety.{s.name}", max(abs(safety[s.name + LOW]), abs(safety[s.name + HIGH])))
             for s in (*signals.inputs, *signals.outputs)
@@ -197,12 +202,14 @@ class MachineTest:
         }
         require_reach(self.table, limits)
         demanded, outputs = self._plan()
+        # Demands are grouped by topic, as a controller takes them.
         columns: dict[str, dict[str, Array]] = {}
         for (topic, name), signal in demanded.items():
             columns.setdefault(topic, {})[name] = signal
         command: Command | None = None
-        if self.own is not None:
-            command = command_by_function(make_own(self.own, self.configuration), columns)
+        if self.controller is not None:
+            tick = make_tick(self.controller, self.configuration)
+            command = command_by_function(tick, columns)
         elif outputs:
             command = command_of(self.machine, self.configuration, columns)
         alive = self.table.plausible
@@ -213,31 +220,30 @@ class MachineTest:
             demands=demanded,
             outputs=outputs,
             command=command,
-            stuck=alive.stuck if isinstance(alive, Alive) else 0.0,
+            stuck=alive.stuck if isinstance(alive, StuckLimit) else 0.0,
         )
 
     def terminals(self) -> MachineTerminals:
-        """Builds the twin at the card's terminals, wired as the table says."""
+        """Build the twin at the card's terminals, wired as the table says."""
         actual = apply_effects(self.configuration, list(self.effects))
         return MachineTerminals(self.machine, actual, self.table, self.seed)
 
     def list_demands(self) -> bytes:
-        """What is demanded, so that it is known again."""
+        """Return the demands as bytes, for a session's key."""
         return b"".join(
             name.encode() + np.ascontiguousarray(signal).tobytes()
             for name, signal in sorted(self.demands.items())
         )
 
     def predict_peaks(self, recording: Recording) -> tuple[Peak, ...]:
-        """How near to every limit a session came."""
-        found = limited_signals(self.machine, self.configuration, recording.columns)
+        """Return how near a session came to every limit."""
+        limited = limited_signals(self.machine, self.configuration, recording.columns)
         return tuple(
-            Peak(limit.name, *limit.nearest(signal), limit.unit) for limit, signal in found
+            Peak(limit.name, *limit.nearest(signal), limit.unit) for limit, signal in limited
         )
 
     def require_limits(self) -> None:
-        """Raises RigtwinError unless all that is commanded has limits: without them nothing keeps a
-        machine from harm."""
+        """Raise RigtwinError unless every command has limits, which alone protect the machine."""
         for signal in self.table.signals.outputs:
             low, high = reach_of(self.configuration, signal.name)
             if not np.isfinite([low, high]).all():
@@ -248,4 +254,5 @@ class MachineTest:
 
 
 AnyTest = Test | MachineTest
-"""Picklable. An `operation` raises RigtwinError where a limit does not fit the card's lines."""
+"""Test of any machine; picklable. `operation` raises RigtwinError if a limit exceeds a line's
+range."""

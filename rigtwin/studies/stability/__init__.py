@@ -1,2 +1,4 @@
-"""Stability of a hybrid test whose motor and cylinder answer late: models, exact critical lags and
-delays, maps."""
+"""Stability of a hybrid test whose motor and cylinder respond late.
+
+The package has state-space models, exact critical lags and delays, and stability maps.
+"""

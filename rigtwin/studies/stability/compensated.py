@@ -1,5 +1,4 @@
-"""What a controller that compensates the plate's delay is told of the rig, and rigs and filters
-that try it."""
+"""Test settings for studies of the plate's delay compensation: exact knowledge, filters, delays."""
 
 from __future__ import annotations
 
@@ -7,15 +6,15 @@ from rigtwin.components.cylinder import told_settings
 from rigtwin.description.configuration import Configuration
 
 
-def tell_plate(configuration: Configuration) -> Configuration:
-    """The test whose controller knows the structure cylinder as it is."""
+def with_exact_plate(configuration: Configuration) -> Configuration:
+    """Return the test with the true structure cylinder in the controller's settings."""
     plant, controller = configuration.plant, configuration.controller
-    told = told_settings(plant.structure_cylinder, plant.computer.delay)
-    return configuration._replace(controller=controller._replace(**told))
+    settings = told_settings(plant.structure_cylinder, plant.computer.delay)
+    return configuration._replace(controller=controller._replace(**settings))
 
 
 def with_filters(configuration: Configuration, time: float) -> Configuration:
-    """The test with all three filters of the controller at that time constant, s."""
+    """Return the test with one time constant, in s, for all three filters of the controller."""
     controller = configuration.controller._replace(
         filter_position=time, filter_velocity=time, filter_force=time
     )
@@ -23,7 +22,7 @@ def with_filters(configuration: Configuration, time: float) -> Configuration:
 
 
 def with_cylinder_delay(configuration: Configuration, delay: float) -> Configuration:
-    """The test on a rig whose structure cylinder has that pure delay, s."""
+    """Return the test on a rig whose structure cylinder has a pure delay, in s."""
     plant = configuration.plant
     late = plant.structure_cylinder._replace(delay=delay)
     return configuration._replace(plant=plant._replace(structure_cylinder=late))

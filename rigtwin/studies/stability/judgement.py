@@ -1,4 +1,4 @@
-"""Whether a vehicle is stable on the rig, by every model of its loop."""
+"""Stability of a vehicle on the rig, by every model of its loop."""
 
 from __future__ import annotations
 
@@ -11,15 +11,23 @@ from rigtwin.studies.stability.models import MODELS, rightmost
 from rigtwin.studies.stability.vehicle import QuarterCar
 
 ROUNDING = 1e-12
-"""Of a pole's distance from the origin: a real part within this is none."""
+"""Relative real part, in shares of the pole's magnitude, that counts as zero."""
 
 
 @dataclass(frozen=True)
 class ModelStability:
-    """What one model says.
+    """Stability by one model.
 
-    real, imaginary: of the rightmost pole, 1/s; critical_lag, critical_delay: s at which the loop
-    begins to swing, and at how many rad/s; None where none does.
+    Attributes
+    ----------
+    real, imaginary
+        Rightmost pole, in 1/s.
+    stable
+        Whether the rightmost pole lies in the left half plane.
+    critical_lag, critical_delay
+        Lag and delay at which the loop begins to oscillate, in s; None if it never does.
+    critical_lag_frequency, critical_delay_frequency
+        Frequencies of these oscillations, in rad/s; None if there are none.
     """
 
     real: float
@@ -33,10 +41,18 @@ class ModelStability:
 
 @dataclass(frozen=True)
 class Stability:
-    """A vehicle on the rig.
+    """Stability of a vehicle on the rig by all models.
 
-    tau: s, of every path; delay: whether poles are with pure delays instead of lags; models: name →
-    what it says.
+    Attributes
+    ----------
+    vehicle
+        The vehicle under test.
+    tau
+        Lag or delay of every path, in s.
+    delay
+        Whether the poles belong to pure delays instead of first-order lags.
+    models
+        Name of the model → its result.
     """
 
     vehicle: QuarterCar
@@ -46,34 +62,35 @@ class Stability:
 
 
 def judge(vehicle: QuarterCar, tau: float, delay: bool) -> Stability:
-    """The poles and the critical lag and delay of every model of a vehicle.
+    """Return the poles, the critical lag and the critical delay of a vehicle by every model.
 
     Parameters
     ----------
     vehicle
-        Of a size at which its poles can be told from rounding.
+        Vehicle of plausible size, so that rounding does not decide the sign of a pole.
     tau
-        s, lag of every path.
+        Lag of every path, in s.
     delay
-        Whether poles are with pure delays instead.
+        Whether the poles are computed with pure delays instead of lags.
 
     Returns
     -------
     Stability
-        By every model.
+        Results of all models.
     """
-    found = {}
+    models = {}
     for name, model in MODELS.items():
         loop = LOOPS[name](vehicle)
         pole = rightmost_delay_root(loop, tau) if delay else rightmost(model(vehicle, tau))
         lag, pure = critical_lag(loop), critical_delay(loop)
-        found[name] = ModelStability(
+        models[name] = ModelStability(
             real=pole.real,
             imaginary=abs(pole.imag),
+            # A pole on the axis within rounding counts as unstable, which is the safe side.
             stable=pole.real < -ROUNDING * abs(pole),
             critical_lag=lag.time if lag else None,
             critical_lag_frequency=lag.frequency if lag else None,
             critical_delay=pure.time if pure else None,
             critical_delay_frequency=pure.frequency if pure else None,
         )
-    return Stability(vehicle, tau, delay, found)
+    return Stability(vehicle, tau, delay, models)

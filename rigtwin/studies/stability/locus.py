@@ -1,5 +1,5 @@
-"""A root locus: the poles of a model while one parameter is swept, and where they cross the
-imaginary axis."""
+"""Root locus: the poles of a model over one swept parameter, and their crossings of the imaginary
+axis."""
 
 from __future__ import annotations
 
@@ -15,22 +15,33 @@ from rigtwin.studies.stability.models import MODELS, ideal_quarter_car, ideal_si
 from rigtwin.studies.stability.vehicle import QuarterCar
 
 ROUNDING = 1e-12
-"""Of a pole's distance from the origin: what of its real part is rounding."""
+"""Relative real part, in shares of the pole's magnitude, that counts as rounding."""
 CLOSE = 1e-9
-"""Of the swept value: how closely a crossing is found."""
+"""Relative accuracy of the swept value at a crossing."""
 BODY, WHEEL = "body hop", "wheel hop"
 
 
 class Setting(NamedTuple):
-    """What a value of the swept parameter means. lag: s."""
+    """Vehicle and lag, in s, at one value of the swept parameter."""
 
     car: QuarterCar
     lag: float
 
 
 class Crossing(NamedTuple):
-    """A pair of poles on the imaginary axis. value: of the swept parameter; frequency: rad/s; mode:
-    which way the masses move; unstable: whether it becomes so as the parameter grows."""
+    """Pair of poles on the imaginary axis.
+
+    Attributes
+    ----------
+    value
+        Value of the swept parameter.
+    frequency
+        Frequency of the poles, in rad/s.
+    mode
+        Mode shape of the masses.
+    unstable
+        Whether the mode becomes unstable as the parameter grows.
+    """
 
     value: float
     frequency: float
@@ -39,11 +50,11 @@ class Crossing(NamedTuple):
 
 
 def mode(car: QuarterCar, pole: complex) -> str:
-    """Body hop if the masses move the same way at a pole, wheel hop if against each other (thesis
-    §5.3.1).
+    """Return the mode shape at a pole (thesis §5.3.1).
 
-    The force of the suspension f moves both, W x_u = f and m_s s² x_s = −f, so x_u/x_s = −m_s s²/W
-    whatever the lags.
+    Body hop: both masses move in the same direction; wheel hop: in opposite directions. The
+    suspension force f moves both, W x_u = f and m_s s² x_s = −f, so x_u/x_s = −m_s s²/W whatever
+    the lags.
     """
     wheel = car.unsprung_mass * pole**2 + car.tyre_damping * pole + car.tyre_stiffness
     return BODY if (-car.sprung_mass * pole**2 / wheel).real > 0.0 else WHEEL
@@ -51,7 +62,17 @@ def mode(car: QuarterCar, pole: complex) -> str:
 
 @dataclass(frozen=True)
 class Locus:
-    """model: of `MODELS`; values: of the swept parameter, rising; at: what each means."""
+    """Poles of a model over one swept parameter.
+
+    Attributes
+    ----------
+    model
+        Name in `MODELS`.
+    values
+        Values of the swept parameter, ascending.
+    at
+        Function from a value to the vehicle and lag.
+    """
 
     model: str
     values: Array
@@ -59,47 +80,49 @@ class Locus:
 
     @cached_property
     def poles(self) -> np.ndarray:
-        """1/s, a row for every value."""
+        """Poles, in 1/s, one row per value."""
         return np.linalg.eigvals(np.array([self._dynamics(value) for value in self.values])).astype(
             complex,
         )
 
     @cached_property
     def ideal(self) -> np.ndarray:
-        """The poles without any lag, 1/s, a row for every value."""
+        """Poles without any lag, in 1/s, one row per value."""
         ideal = self._ideal
         return np.linalg.eigvals(
             np.array([ideal(self.at(value).car) for value in self.values]),
         ).astype(complex)
 
     def poles_at(self, value: float) -> np.ndarray:
-        """1/s."""
+        """Return the poles at one value, in 1/s."""
         return np.linalg.eigvals(self._dynamics(value)).astype(complex)
 
     def ideal_at(self, value: float) -> np.ndarray:
-        """1/s."""
+        """Return the poles without any lag at one value, in 1/s."""
         return np.linalg.eigvals(self._ideal(self.at(value).car)).astype(complex)
 
     def unstable_modes(self, value: float) -> tuple[str, ...]:
-        """The modes of all poles to the right of the imaginary axis, each once."""
+        """Return the modes of all unstable poles, without repetition."""
         car = self.at(value).car
         poles = (pole for pole in self.poles_at(value) if _is_unstable(pole) and pole.imag >= 0.0)
         return tuple(sorted({self.mode(car, pole) for pole in poles}))
 
     @cached_property
     def crossings(self) -> list[Crossing]:
-        """All crossings, in the order of the swept values."""
+        """Crossings of the imaginary axis, in the order of the swept values."""
         counts = np.sum(_is_unstable(self.poles), axis=1)
-        found: list[Crossing] = []
+        crossings: list[Crossing] = []
         for i in np.flatnonzero(counts[:-1] != counts[1:]):
-            found += self._find_crossings(float(self.values[i]), float(self.values[i + 1]))
-        return found
+            crossings += self._find_crossings(float(self.values[i]), float(self.values[i + 1]))
+        return crossings
 
     def mode(self, car: QuarterCar, pole: complex) -> str:
-        """Body hop or wheel hop; a single mass has nothing but a body."""
+        """Return the mode shape at a pole; a single mass has only body hop."""
         return BODY if self.model == "single-mass" else mode(car, pole)
 
     def _find_crossings(self, low: float, high: float) -> list[Crossing]:
+        # Bisection on the number of unstable poles, in ratios because sweeps span decades. Both
+        # halves are searched, since several pairs can cross in one interval.
         below, above = self._count(low), self._count(high)
         if below == above:
             return []
@@ -107,12 +130,14 @@ class Locus:
             middle = float(np.sqrt(low * high))
             return self._find_crossings(low, middle) + self._find_crossings(middle, high)
         before, after = self.poles_at(low), self.poles_at(high)
+        # One pole of each complex pair is enough; real poles do not cross with a frequency.
         after = after[after.imag > 0.0]
+        # Poles are paired by distance, because eigenvalues come in no particular order.
         nearest = before[np.argmin(np.abs(after[:, None] - before[None, :]), axis=1)]
         car = self.at(high).car
         crossed = after[_is_unstable(after) != _is_unstable(nearest)]
-        found = [(float(pole.imag), self.mode(car, pole)) for pole in crossed]
-        return sorted(Crossing(high, frequency, mode, above > below) for frequency, mode in found)
+        modes = [(float(pole.imag), self.mode(car, pole)) for pole in crossed]
+        return sorted(Crossing(high, frequency, mode, above > below) for frequency, mode in modes)
 
     def _count(self, value: float) -> int:
         return int(np.sum(_is_unstable(self.poles_at(value))))
@@ -129,5 +154,5 @@ class Locus:
 
 
 def _is_unstable(poles: np.ndarray) -> np.ndarray:
-    """Which lie to the right of the imaginary axis."""
+    """Return which poles lie to the right of the imaginary axis."""
     return poles.real > ROUNDING * np.abs(poles)

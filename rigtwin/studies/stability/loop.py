@@ -1,13 +1,12 @@
-"""The characteristic function of a loop, a polynomial in s and z; z stands for one lag 1/(1 + τ s)
-or one delay exp(−τ s).
+"""Characteristic function of a loop: a polynomial in s and z.
 
-Single mass: m s² + z (k + b s). Quarter car, with N = k_s + b_s s, W = m_u s² + b_t s + k_t and f
-the force of the suspension: W x_u = f, m_s s² x_s = −f, f = z_force N (z_structure x_s − x_u), so
-that
+z represents one lag 1/(1 + τ s) or one delay exp(−τ s). A single mass has m s² + z (k + b s). For a
+quarter car let N = k_s + b_s s, W = m_u s² + b_t s + k_t, and f the suspension force. Then
+W x_u = f, m_s s² x_s = −f and f = z_force N (z_structure x_s − x_u), so that
 
     m_s s² W + z_force N (z_structure W + m_s s²) = 0.
 
-A loop is kept as power of z → polynomial in s.
+A loop is stored as a mapping from the power of z to its polynomial in s.
 """
 
 from __future__ import annotations
@@ -20,21 +19,37 @@ from numpy.polynomial import Polynomial
 from rigtwin.studies.stability.vehicle import QuarterCar, SingleMass, validate
 
 Loop = Mapping[int, Polynomial]
-"""Power of z → polynomial in s."""
+"""Mapping from the power of z to its polynomial in s."""
 Roots = np.ndarray
-"""Complex numbers, 1/s."""
+"""Complex array of roots, in 1/s."""
 
 
 def single_mass(mass: SingleMass, lags: int = 1) -> Loop:
-    """The loop of a single mass whose force comes through that many lags or delays in series (Eq.
-    5.17, §5.1.6)."""
+    """Return the loop of a single mass (Eq. 5.17, §5.1.6).
+
+    Parameters
+    ----------
+    mass
+        Mass on a spring and a damper.
+    lags
+        Number of lags or delays in series in the path of the force.
+    """
     validate(mass)
     return {0: Polynomial([0.0, 0.0, mass.mass]), lags: Polynomial([mass.stiffness, mass.damping])}
 
 
 def quarter_car(car: QuarterCar, force: int, structure: int) -> Loop:
-    """The loop of a quarter car. force, structure: how many lags or delays the suspension's force
-    and the sprung mass's motion come through."""
+    """Return the loop of a quarter car.
+
+    Parameters
+    ----------
+    car
+        The vehicle.
+    force
+        Number of lags or delays in the path of the suspension's force.
+    structure
+        Number of lags or delays in the path of the sprung mass's motion.
+    """
     validate(car)
     sprung = Polynomial([0.0, 0.0, car.sprung_mass])
     wheel = Polynomial([car.tyre_stiffness, car.tyre_damping, car.unsprung_mass])
@@ -52,38 +67,46 @@ LOOPS: Mapping[str, Callable[[QuarterCar], Loop]] = {
     "combined": lambda car: quarter_car(car, force=1, structure=1),
     "rig": lambda car: quarter_car(car, force=2, structure=1),
 }
-"""Model → its loop, all lags or delays equal. Those of the rig (§6.2): force; travel and velocity,
-which come in parallel and count once; plate."""
+"""Model → its loop with equal lags or delays. The rig's paths (§6.2) are: the force; travel and its
+velocity, which are parallel and count once; and the plate."""
 
 
 def order(loop: Loop) -> int:
-    """The highest power of z."""
+    """Return the highest power of z."""
     return max(loop)
 
 
 def instant(loop: Loop) -> Polynomial:
-    """The characteristic polynomial without any lag or delay, z = 1."""
+    """Return the characteristic polynomial without lag or delay, z = 1."""
     return lag_polynomial(loop, 0.0)
 
 
 def lag_polynomial(loop: Loop, lag: float) -> Polynomial:
-    """The characteristic polynomial with z = 1/(1 + lag s), times (1 + lag s) to the highest power.
-    lag: s."""
+    """Return the characteristic polynomial with z = 1/(1 + lag s), lag in s.
+
+    The polynomial is multiplied by (1 + lag s) to the highest power of z.
+    """
     factor, highest = Polynomial([1.0, lag]), order(loop)
     terms = [polynomial * factor ** (highest - power) for power, polynomial in loop.items()]
     return sum(terms[1:], terms[0])
 
 
 def delay_function(loop: Loop, delay: float, s: complex) -> complex:
-    """The characteristic function with z = exp(−delay s) at s. delay: s."""
+    """Return the characteristic function at s, with z = exp(−delay s) and the delay in s."""
     return complex(
         sum(polynomial(s) * np.exp(-power * delay * s) for power, polynomial in loop.items()),
     )
 
 
 def roots(coefficients: np.ndarray) -> Roots:
-    """The roots of polynomials of one degree, their coefficients in ascending powers on the last
-    axis."""
+    """Return the roots of several polynomials of the same degree.
+
+    Parameters
+    ----------
+    coefficients
+        Coefficients in ascending powers, shape (..., degree + 1).
+    """
+    # Roots are the eigenvalues of the companion matrix; eigvals takes a whole stack of them.
     degree = coefficients.shape[-1] - 1
     companions = np.zeros((*coefficients.shape[:-1], degree, degree), coefficients.dtype)
     companions[..., np.arange(1, degree), np.arange(degree - 1)] = 1.0
@@ -92,19 +115,24 @@ def roots(coefficients: np.ndarray) -> Roots:
 
 
 def lag_roots(loop: Loop, lag: float) -> Roots:
-    """The poles of a loop with lags, s."""
+    """Return the poles of a loop with lags, the lag in s."""
     return roots(lag_polynomial(loop, lag).coef)
 
 
 def bound(loop: Loop) -> float:
-    """1/s. No root with a real part of 0 or more is further from the origin, whatever the lag or
-    the delay: there |z| ≤ 1, and beyond this the highest power of s outweighs all else together."""
-    own = np.abs(loop[0].coef)
-    rest = np.zeros(len(own))
-    for each in (
-        own[:-1],
+    """Return a bound on the magnitude of all unstable roots, in 1/s.
+
+    The bound holds for every lag and delay: in the right half plane |z| ≤ 1, so beyond the bound
+    the highest power of s exceeds the sum of all remaining terms.
+    """
+    # Cauchy's bound: the positive root of |a_n| s^n − Σ |a_k| s^k, with the terms of all powers
+    # of z added up.
+    leading = np.abs(loop[0].coef)
+    margin = np.zeros(len(leading))
+    for magnitudes in (
+        leading[:-1],
         *(np.abs(polynomial.coef) for power, polynomial in loop.items() if power),
     ):
-        rest[: len(each)] -= each
-    rest[-1] += own[-1]
-    return float(Polynomial(rest).roots().real.max())
+        margin[: len(magnitudes)] -= magnitudes
+    margin[-1] += leading[-1]
+    return float(Polynomial(margin).roots().real.max())

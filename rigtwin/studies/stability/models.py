@@ -1,13 +1,16 @@
-"""The thesis' state-space models as python-control systems with named states (§5.1 to 5.3, §6.2).
+"""State-space models of the thesis (§5.1 to 5.3, §6.2) as python-control systems with named states.
 
-μ is what the ground does: k u + b u̇ of the suspension for a single mass, k_t u + b_t u̇ of the
-tyre for a quarter car, N.
+The input μ, in N, is the effect of the ground: k u + b u̇ of the suspension for a single mass,
+k_t u + b_t u̇ of the tyre for a quarter car.
 
-Corrected here: (5.7) and (5.16) print −k and −b in the row of the mass, which would be a spring
-that pushes away; (5.16) also +1/τ for −1/τ in the row of the lagged velocity. (5.13) feeds μ past
-the force filter, (5.17) through it, as is done here. (5.37) prints b_s u for k_t u and (5.38) k_t
-for k_s; the matrix (5.43) has both right. (5.55) and (5.56) are lost; they are (5.53) and (5.54) as
-first-order rows, and the same with the suspension's force through a filter.
+The thesis has misprints that are corrected here:
+
+- (5.7) and (5.16) print −k and −b in the row of the mass, a spring that pushes away.
+- (5.16) prints +1/τ for −1/τ in the row of the lagged velocity.
+- (5.13) feeds μ past the force filter; (5.17) feeds it through, as this module does.
+- (5.37) prints b_s u for k_t u, and (5.38) k_t for k_s; the matrix (5.43) has both right.
+- (5.55) and (5.56) are missing; they are (5.53) and (5.54) as first-order rows, and the same with
+  the suspension's force through a filter.
 """
 
 from __future__ import annotations
@@ -18,16 +21,25 @@ from typing import NamedTuple
 import numpy as np
 from control import StateSpace
 
-from rigtwin.studies.stability.vehicle import QuarterCar, SingleMass, checked_time, validate
+from rigtwin.studies.stability.vehicle import QuarterCar, SingleMass, check_time, validate
 
 GROUND = "mu"
 Rows = Mapping[str, Mapping[str, float]]
-"""State → the coefficients of its time derivative by state, or `mu`."""
+"""State → coefficients of its time derivative, by state or `mu`."""
 
 
 class Lags(NamedTuple):
-    """First-order lags of the rig, s (§6.2): of the force, of the plate, and of the filters of
-    travel and of its velocity."""
+    """First-order lags of the rig, in s (§6.2).
+
+    Attributes
+    ----------
+    force
+        Lag of the force loop.
+    plate
+        Lag of the plate's cylinder.
+    travel, velocity
+        Lags of the filters of the travel and of its velocity.
+    """
 
     force: float
     plate: float
@@ -36,7 +48,7 @@ class Lags(NamedTuple):
 
 
 def ideal_single_mass(mass: SingleMass) -> StateSpace:
-    """(5.7)."""
+    """Return the model of a single mass without lags (5.7)."""
     m, k, b = validate(mass)
     return _system(
         {
@@ -48,13 +60,16 @@ def ideal_single_mass(mass: SingleMass) -> StateSpace:
 
 
 def single_mass_suspension(mass: SingleMass, *lags: float) -> StateSpace:
-    """(5.13): the force comes through a first-order lag, s; through several in series for
-    §5.1.6."""
+    """Return the model of a single mass whose force passes through first-order lags (5.13).
+
+    Several lags, in s, act in series (§5.1.6).
+    """
     m, k, b = validate(mass)
     demanded = {"position": k, "velocity": b, GROUND: -1.0}
     rows: dict[str, dict[str, float]] = {}
+    # Each lag filters the output of the one before: τ ẏ + y = x.
     for number, lag in enumerate(lags):
-        checked_time("lag", lag)
+        check_time("lag", lag)
         state = "force" if number == len(lags) - 1 else f"force_{number + 1}"
         rows[state] = {state: -1.0 / lag} | {name: value / lag for name, value in demanded.items()}
         demanded = {state: 1.0}
@@ -66,8 +81,10 @@ def single_mass_suspension(mass: SingleMass, *lags: float) -> StateSpace:
 
 
 def single_mass_structure(mass: SingleMass, lag: float) -> StateSpace:
-    """(5.16): position and velocity of the mass come through a lag each, s. The plate is where the
-    lagged position is."""
+    """Return the model of a single mass whose position and velocity pass through a lag (5.16).
+
+    Both lags have the same time constant, in s. The plate stands at the lagged position.
+    """
     m, k, b = validate(mass)
     return _system(
         {
@@ -82,12 +99,12 @@ def single_mass_structure(mass: SingleMass, lag: float) -> StateSpace:
 
 
 def ideal_quarter_car(car: QuarterCar) -> StateSpace:
-    """(5.43)."""
+    """Return the model of a quarter car without lags (5.43)."""
     return _quarter_car(car, {}, _force(car, "body", "body_velocity"))
 
 
 def suspension(car: QuarterCar, lag: float) -> StateSpace:
-    """(5.48): the suspension's force comes through a lag, s."""
+    """Return the model of a quarter car whose suspension force has a lag, in s (5.48)."""
     return _quarter_car(
         car,
         {"force": _filtered_force(car, "body", "body_velocity", lag)},
@@ -96,25 +113,34 @@ def suspension(car: QuarterCar, lag: float) -> StateSpace:
 
 
 def structure(car: QuarterCar, lag: float) -> StateSpace:
-    """(5.55), from (5.49) to (5.54): position and velocity of the sprung mass come through a lag
-    each, s."""
+    """Return the model of a quarter car whose sprung mass moves with a lag (5.55).
+
+    Position and velocity of the sprung mass have the same lag, in s; see (5.49) to (5.54).
+    """
     return _quarter_car(car, _plate(lag), _force(car, "plate", "plate_velocity"), "plate")
 
 
 def combined(car: QuarterCar, force_lag: float, structure_lag: float) -> StateSpace:
-    """(5.56): the force filter is fed the lagged position and velocity of the sprung mass. Lags in
-    s."""
+    """Return the model of a quarter car with lags of force and sprung mass, in s (5.56).
+
+    The force filter is fed the lagged position and velocity of the sprung mass.
+    """
     force = _filtered_force(car, "plate", "plate_velocity", force_lag)
     return _quarter_car(car, {"force": force} | _plate(structure_lag), {"force": 1.0}, "plate")
 
 
 def rig(car: QuarterCar, lags: Lags) -> StateSpace:
-    """Figure 6.14: the plate follows the sprung mass, travel and its velocity are measured from the
-    plate and filtered, and the force follows its demand."""
+    """Return the model of the rig (Figure 6.14).
+
+    The plate follows the sprung mass, travel and its velocity are measured from the plate and
+    filtered, and the force follows its demand.
+    """
     for lag in lags:
-        checked_time("lag", lag)
+        check_time("lag", lag)
     plate = _lag_row("plate", "body", lags.plate)
+    # Travel is measured between plate and wheel, then filtered: τ ẏ + y = plate − wheel.
     travel = {"plate": 1.0 / lags.travel, "wheel": -1.0 / lags.travel, "travel": -1.0 / lags.travel}
+    # The velocity filter is fed the derivative of the plate's lagged position.
     velocity = {name: value / lags.velocity for name, value in plate.items()}
     velocity |= {"wheel_velocity": -1.0 / lags.velocity, "velocity": -1.0 / lags.velocity}
     demanded = {"travel": car.suspension_stiffness, "velocity": car.suspension_damping}
@@ -136,34 +162,33 @@ MODELS: Mapping[str, Callable[[QuarterCar, float], StateSpace]] = {
     "combined": lambda car, lag: combined(car, lag, lag),
     "rig": lambda car, lag: rig(car, Lags(lag, lag, lag, lag)),
 }
-"""Model → its system with all lags equal, s; the names are those of
+"""Model → its system with one value, in s, for all lags. The names are those of
 `rigtwin.studies.stability.loop.LOOPS`."""
 
 
 def poles(system: StateSpace) -> np.ndarray:
-    """The poles, 1/s, from the left to the right; of a pair the one with positive frequency
-    first."""
-    return in_order(np.asarray(system.poles()))
+    """Return the poles, in 1/s, sorted as by `sort_poles`."""
+    return sort_poles(np.asarray(system.poles()))
 
 
 def rightmost(system: StateSpace) -> complex:
-    """The pole with the largest real part, of a pair the one with positive frequency, 1/s."""
+    """Return the pole with the largest real part, in 1/s; of a pair, the one with Im > 0."""
     return complex(max(poles(system).tolist(), key=lambda pole: (round(pole.real, 9), pole.imag)))
 
 
-def in_order(found: np.ndarray) -> np.ndarray:
-    """Poles from the left to the right, of a pair the one with positive frequency first."""
-    # Rounded, or the two of a pair would be in the order of their last bits.
-    return found[np.lexsort((-found.imag, np.round(found.real, 9)))]
+def sort_poles(poles: np.ndarray) -> np.ndarray:
+    """Return poles sorted by real part; of a pair, the one with positive frequency first."""
+    # Rounding keeps a pair together, whose real parts differ in their last bits.
+    return poles[np.lexsort((-poles.imag, np.round(poles.real, 9)))]
 
 
 def _lag_row(output: str, source: str, lag: float) -> dict[str, float]:
-    """τ ẏ + y = x (5.11)."""
-    return {output: -1.0 / checked_time("lag", lag), source: 1.0 / lag}
+    """Return the row of a first-order lag, τ ẏ + y = x (5.11)."""
+    return {output: -1.0 / check_time("lag", lag), source: 1.0 / lag}
 
 
 def _plate(lag: float) -> dict[str, dict[str, float]]:
-    """(5.50) and (5.52)."""
+    """Return the rows of the plate's position and velocity (5.50, 5.52)."""
     return {
         "plate": _lag_row("plate", "body", lag),
         "plate_velocity": _lag_row("plate_velocity", "body_velocity", lag),
@@ -171,14 +196,14 @@ def _plate(lag: float) -> dict[str, dict[str, float]]:
 
 
 def _force(car: QuarterCar, position: str, velocity: str) -> dict[str, float]:
-    """The suspension's force, which pulls the sprung mass down and the wheel up, N."""
+    """Return the suspension force, in N, which pulls the sprung mass down and the wheel up."""
     k, b = car.suspension_stiffness, car.suspension_damping
     return {position: k, velocity: b, "wheel": -k, "wheel_velocity": -b}
 
 
 def _filtered_force(car: QuarterCar, position: str, velocity: str, lag: float) -> dict[str, float]:
-    """(5.45)."""
-    checked_time("lag", lag)
+    """Return the row of the suspension force after its lag (5.45)."""
+    check_time("lag", lag)
     return {name: value / lag for name, value in _force(car, position, velocity).items()} | {
         "force": -1.0 / lag,
     }
@@ -190,9 +215,10 @@ def _quarter_car(
     force: dict[str, float],
     *outputs: str,
 ) -> StateSpace:
-    """Both masses (5.46, 5.47) under that force."""
+    """Return the system of both masses (5.46, 5.47) under a suspension force."""
     validate(car)
     tyre = {"wheel": -car.tyre_stiffness, "wheel_velocity": -car.tyre_damping, GROUND: 1.0}
+    # The wheel feels the suspension's force and the tyre's; the sprung mass feels the reaction.
     wheel = {name: force.get(name, 0.0) + tyre.get(name, 0.0) for name in force | tyre}
     rows = {
         "wheel": {"wheel_velocity": 1.0},
@@ -204,7 +230,9 @@ def _quarter_car(
 
 
 def _system(rows: Rows, *outputs: str) -> StateSpace:
+    """Assemble a state-space system from its rows, with the states' names."""
     states = list(rows)
+    # A state that a row does not name has the coefficient 0.
     dynamics = np.array([[row.get(state, 0.0) for state in states] for row in rows.values()])
     ground = np.array([[row.get(GROUND, 0.0)] for row in rows.values()])
     read = np.array([[float(state == output) for state in states] for output in outputs])

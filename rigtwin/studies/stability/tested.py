@@ -1,5 +1,7 @@
-"""A vehicle on the rig as it runs: sampled, with cylinders, motor, filters and delays; plain, and
-with what makes most vehicles testable."""
+"""A vehicle on the sampled rig with cylinders, motor, filters and delays.
+
+The rig is studied as it is, and with the compensation that makes most vehicles testable.
+"""
 
 from __future__ import annotations
 
@@ -12,34 +14,46 @@ from rigtwin.components import Carriage, RigPlant, Tyre
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.settings import Timing
 from rigtwin.simulation.runner import without_limits
-from rigtwin.studies.stability.compensated import tell_plate, with_cylinder_delay, with_filters
+from rigtwin.studies.stability.compensated import (
+    with_cylinder_delay,
+    with_exact_plate,
+    with_filters,
+)
 from rigtwin.studies.stability.sampled_loop import decay
 from rigtwin.studies.stability.vehicle import QuarterCar
 
 CARRIED = 0.9
-"""Share of the body's weight that the spring carries at the start, so that it drops."""
+"""Share of the body's weight that the spring carries at the start; the body drops by the rest."""
 FILTER, KP, KI = 1e-3, 1.0, 50.0
-"""s, and the force loop's gains, of a compensated test: with the plate's delay gone, those of the
-filters and of the force are what is left."""
+"""Time constant of the filters, in s, and gains of the force loop, of a compensated test. Without
+the plate's delay, filters and force loop limit stability."""
 LONGEST, CLOSE = 0.05, 1e-4
-"""s: the longest delay of the cylinder that is looked at, and how closely."""
+"""Longest delay of the cylinder that is tested, in s, and the accuracy of the limit, in s."""
 ANY_FORCE, ANY_VOLTAGE = 1e9, 1e7
-"""N and V: of a motor that bears any vehicle."""
+"""Limits of a motor that can carry any vehicle, in N and V."""
 
 
 @dataclass(frozen=True)
 class RigMargin:
-    """plain, compensated: how fast the loop's slowest motion dies away, 1/s, below zero it grows;
-    bears: s of delay of the structure cylinder that the compensator is not told of and with which
-    the loop still is stable, None where it never is."""
+    """Margin of stability of a vehicle on the sampled rig.
+
+    Attributes
+    ----------
+    plain, compensated
+        Rate of decay of the slowest mode, in 1/s, without and with compensation of the plate's
+        delay. Negative if the mode grows.
+    delay_margin
+        Largest delay of the structure cylinder, in s, that is unknown to the compensator and with
+        which the loop is still stable. None if the loop is never stable.
+    """
 
     plain: float
     compensated: float
-    bears: float | None
+    delay_margin: float | None
 
 
-def rig_as(car: QuarterCar) -> Configuration:
-    """The rig set up as a vehicle that is dropped.
+def configure_vehicle(car: QuarterCar) -> Configuration:
+    """Return the rig's settings for a vehicle that is dropped.
 
     Parameters
     ----------
@@ -64,9 +78,10 @@ def rig_as(car: QuarterCar) -> Configuration:
 
 
 def sized(configuration: Configuration) -> Configuration:
-    """The same on a rig whose motor, amplifier and limits bear any vehicle."""
+    """Return the test on a rig whose motor, amplifier and limits suit any vehicle."""
     plant, controller = configuration.plant, configuration.controller
     motor = plant.motor._replace(force_limit=ANY_FORCE, voltage_limit=ANY_VOLTAGE)
+    # Safety limits and saturation have no place in a linear study of stability.
     return without_limits(
         configuration._replace(
             plant=plant._replace(motor=motor),
@@ -76,67 +91,80 @@ def sized(configuration: Configuration) -> Configuration:
 
 
 def set_for_compensation(
-    configuration: Configuration, by: PlateCompensator = PlateCompensator.KALMAN_INVERSE
+    configuration: Configuration, compensator: PlateCompensator = PlateCompensator.KALMAN_INVERSE
 ) -> Configuration:
-    """The same with the settings of a compensated test: the plate's delay taken away by what is
-    told of the cylinder as it is, short filters, a firm force loop, and the motor's friction
-    observed and taken away, which a loop with the plate's delay does not bear."""
-    short = with_filters(tell_plate(configuration), FILTER)
+    """Return the test with the settings of a compensated test.
+
+    The compensator knows the true cylinder. Filters are short and the force loop is stiff. The
+    motor's friction is observed and compensated, which is unstable with the plate's delay.
+    """
+    short = with_filters(with_exact_plate(configuration), FILTER)
     controller = short.controller._replace(
         compensator=Compensator.OBSERVER,
         kp=KP,
         ki=KI,
-        plate_compensator=by,
+        plate_compensator=compensator,
     )
     return short._replace(controller=controller)
 
 
 def decay_plain(car: QuarterCar) -> float:
-    """How fast the slowest motion dies away on the rig as it is, 1/s."""
-    return decay(rig_as(car))
+    """Return the rate of decay of the slowest mode on the rig as it is, in 1/s."""
+    return decay(configure_vehicle(car))
 
 
 def decay_compensated(
     car: QuarterCar,
-    untold: float = 0.0,
-    by: PlateCompensator = PlateCompensator.KALMAN_INVERSE,
+    unknown_delay: float = 0.0,
+    compensator: PlateCompensator = PlateCompensator.KALMAN_INVERSE,
 ) -> float:
-    """The same with the plate compensated. untold: s of delay of the cylinder that the compensator
-    does not know."""
-    return decay(with_cylinder_delay(set_for_compensation(rig_as(car), by), untold))
+    """Return the rate of decay of the slowest mode with the plate compensated, in 1/s.
+
+    Parameters
+    ----------
+    car
+        The vehicle.
+    unknown_delay
+        Delay of the structure cylinder that the compensator does not know, in s.
+    compensator
+        Compensator of the plate's delay.
+    """
+    configuration = set_for_compensation(configure_vehicle(car), compensator)
+    return decay(with_cylinder_delay(configuration, unknown_delay))
 
 
 AS_RUN: Mapping[str, Callable[[QuarterCar], float]] = {
     "sampled": decay_plain,
     "compensated": decay_compensated,
 }
-"""Name of a model of the whole sampled loop → its decay."""
+"""Name of a model of the sampled loop → its rate of decay."""
 
 
 def judge_margin(
-    car: QuarterCar, by: PlateCompensator = PlateCompensator.KALMAN_INVERSE
+    car: QuarterCar, compensator: PlateCompensator = PlateCompensator.KALMAN_INVERSE
 ) -> RigMargin:
-    """A vehicle on the rig as it runs.
+    """Return the margins of stability of a vehicle on the sampled rig.
 
     Parameters
     ----------
     car
         The vehicle.
-    by
-        The compensator of the plate's delay.
+    compensator
+        Compensator of the plate's delay.
 
     Returns
     -------
     RigMargin
-        Plain and compensated.
+        Rates of decay without and with compensation, and the delay margin.
     """
-    plain, compensated = decay_plain(car), decay_compensated(car, by=by)
+    plain, compensated = decay_plain(car), decay_compensated(car, compensator=compensator)
     if compensated <= 0.0:
         return RigMargin(plain, compensated, None)
+    # Bisection: more unknown delay only destabilises.
     low, high = 0.0, LONGEST
     while high - low > CLOSE:
         middle = 0.5 * (low + high)
-        if decay_compensated(car, middle, by) > 0.0:
+        if decay_compensated(car, middle, compensator) > 0.0:
             low = middle
         else:
             high = middle

@@ -1,4 +1,4 @@
-"""The linear vehicles whose loops are studied (thesis Figure 5.1 and §5.3.1)."""
+"""Linear vehicles of the stability studies (thesis Figure 5.1 and §5.3.1)."""
 
 from __future__ import annotations
 
@@ -8,18 +8,19 @@ from typing import NamedTuple, TypeVar
 from rigtwin.errors import RigtwinError
 
 SMALLEST, LARGEST = 1e-9, 1e12
-"""kg, N/m and Ns/m: what can be computed at all."""
+"""Range of masses, stiffnesses and dampings, in kg, N/m and Ns/m, that can be computed."""
 LEAST, MOST = (
     {"mass": 1e-3, "stiffness": 1e-3, "damping": 1e-6},
     {"mass": 1e6, "stiffness": 1e9, "damping": 1e9},
 )
-"""kg, N/m and Ns/m: beyond these rounding may decide which pole is stable."""
+"""Range of plausible values, in kg, N/m and Ns/m. Beyond it rounding may decide which pole is
+stable."""
 SHORTEST, LONGEST = 1e-9, 1e6
-"""s."""
+"""Range of lags and delays, in s."""
 
 
 class SingleMass(NamedTuple):
-    """A mass on a spring and a damper: kg, N/m, Ns/m."""
+    """Mass on a spring and a damper, in kg, N/m and Ns/m."""
 
     mass: float
     stiffness: float
@@ -27,18 +28,17 @@ class SingleMass(NamedTuple):
 
     @property
     def natural_frequency(self) -> float:
-        """Undamped, rad/s."""
+        """Undamped natural frequency, in rad/s."""
         return math.sqrt(self.stiffness / self.mass)
 
     @property
     def damping_ratio(self) -> float:
-        """Damping over critical damping (Eq. 5.34)."""
+        """Ratio of the damping to critical damping (Eq. 5.34)."""
         return self.damping / (2.0 * math.sqrt(self.stiffness * self.mass))
 
 
 class QuarterCar(NamedTuple):
-    """Tyre stiffness N/m and damping Ns/m, unsprung mass kg, suspension stiffness N/m and damping
-    Ns/m, sprung mass kg."""
+    """Quarter car: masses in kg, stiffnesses in N/m, dampings in Ns/m."""
 
     tyre_stiffness: float
     tyre_damping: float
@@ -49,12 +49,12 @@ class QuarterCar(NamedTuple):
 
     @property
     def sprung(self) -> SingleMass:
-        """The sprung mass on its suspension alone, the wheel held still."""
+        """Sprung mass on its suspension alone, with the wheel held."""
         return SingleMass(self.sprung_mass, self.suspension_stiffness, self.suspension_damping)
 
     @property
     def unsprung(self) -> SingleMass:
-        """The unsprung mass on its tyre alone, the suspension taken away."""
+        """Unsprung mass on its tyre alone, without the suspension."""
         return SingleMass(self.unsprung_mass, self.tyre_stiffness, self.tyre_damping)
 
 
@@ -62,16 +62,27 @@ Vehicle = TypeVar("Vehicle", SingleMass, QuarterCar)
 
 
 def validate(vehicle: Vehicle) -> Vehicle:
-    """The vehicle. Raises RigtwinError unless masses and stiffnesses are above 0 and dampings 0 or
-    more."""
+    """Return the vehicle unchanged if it can be computed.
+
+    Raises
+    ------
+    RigtwinError
+        If a mass or stiffness is not positive, or a damping is negative.
+    """
     for name, value in vehicle._asdict().items():
         _within(name, value, SMALLEST, LARGEST)
     return vehicle
 
 
-def believable(vehicle: Vehicle) -> Vehicle:
-    """The vehicle. Raises RigtwinError unless it is of a size at which its poles can be told from
-    rounding."""
+def check_plausible(vehicle: Vehicle) -> Vehicle:
+    """Return the vehicle unchanged if its size is plausible.
+
+    Raises
+    ------
+    RigtwinError
+        If a value is so extreme that rounding may decide the sign of a pole.
+    """
+    # The last word of a field's name is its kind of quantity: sprung_mass, tyre_damping.
     for name, value in vehicle._asdict().items():
         kind = name.rpartition("_")[2]
         _within(name, value, LEAST[kind], MOST[kind])
@@ -79,6 +90,7 @@ def believable(vehicle: Vehicle) -> Vehicle:
 
 
 def _within(name: str, value: float, low: float, high: float) -> None:
+    """Raise RigtwinError unless a value is in its range; a damping may also be 0."""
     damping = name.endswith("damping")
     if not (low <= value <= high or (damping and value == 0.0)):
         raise RigtwinError(
@@ -86,9 +98,15 @@ def _within(name: str, value: float, low: float, high: float) -> None:
         )
 
 
-def checked_time(name: str, value: float) -> float:
-    """A lag or a delay, s. Raises RigtwinError unless it is above 0 and of a size that poles can be
-    told apart at."""
+def check_time(name: str, value: float) -> float:
+    """Return a lag or delay, in s, unchanged if poles can be computed with it.
+
+    Raises
+    ------
+    RigtwinError
+        If the time is not positive, or so extreme that poles cannot be resolved.
+    """
+
     if not SHORTEST <= value <= LONGEST:
         raise RigtwinError(f"{name} {value:g}: expected {SHORTEST:g} to {LONGEST:g} s")
     return value

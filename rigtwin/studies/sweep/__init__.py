@@ -1,6 +1,6 @@
-"""Many runs side by side: on this computer's cores or a cluster's, results on disk as they come.
+"""Many runs side by side, on the cores of this computer or of a cluster, with results on disk.
 
-Whoever works, the results are the same.
+The results do not depend on who computes them.
 """
 
 from rigtwin.studies.sweep.jobs import iterate_results, run_jobs

@@ -1,4 +1,4 @@
-"""What a result depends on besides its job: the sources and models of this version."""
+"""Digest of the sources and models that every result of this version depends on."""
 
 from __future__ import annotations
 
@@ -14,15 +14,16 @@ SOURCES = {
     "machines": "*.toml",
     "models": "*.xml",
 }
-"""Package → files. They are looked for, not imported."""
+"""Package → pattern of its files. The packages are located without being imported."""
 
 
 @cache
 def source_digest() -> str:
-    """Digest all sources into twelve hexadecimal digits.
+    """Return a digest of all sources, twelve hexadecimal digits.
 
-    The same on two computers means the same answers.
+    Two computers with equal digests compute equal results.
     """
+    # Files are read in sorted order, because the order of a directory differs between systems.
     digest = hashlib.sha256()
     for package, pattern in SOURCES.items():
         spec = find_spec(package)

@@ -1,4 +1,4 @@
-"""Jobs done by workers, their results as they come or in a store."""
+"""Jobs done by workers, with results yielded as they come or put into a store."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from rigtwin.studies.sweep.store import Store
 from rigtwin.studies.sweep.workers import Workers
 
 Job = tuple[str, Any]
-"""Key and argument."""
+"""Key of a job's result, and the argument of its function."""
 MOST_LOSSES = 3
-"""Times that a worker may die over one job before the job is to blame."""
+"""Number of workers that may die over one job before the job is refused."""
 
 
 def run_jobs(
@@ -25,27 +25,27 @@ def run_jobs(
     jobs: Iterable[Job],
     progress: Callable[[int], object] = lambda _: None,
 ) -> None:
-    """Put every job's result into the store, unless it is there.
+    """Compute the results that a store lacks.
 
-    Whatever ends this early, what is done stays done. Memory does not grow with the number of jobs.
-
+    Results that are finished stay stored, whatever ends the sweep early. Memory does not grow with
+    the number of jobs.
     Parameters
     ----------
     store : Store
-        Where results are kept, by the keys of their jobs.
+        Results by the keys of their jobs.
     workers : Workers
-        Who does the jobs.
+        Workers that do the jobs.
     function : callable
-        Of a module; called with a job's argument.
+        Function of a module, so that processes can import it. It is called with a job's argument.
     jobs : iterable of (str, object)
-        Key and argument of each.
+        Key and argument of each job.
     progress : callable, optional
-        Called with 1 for each result that is there.
+        Function called with 1 for each stored result.
 
     Raises
     ------
     RigtwinError
-        If workers keep dying or a result cannot be written. What a job raises is raised too.
+        If workers keep dying or a result cannot be written. Errors of a job propagate.
     """
 
     def iterate_missing() -> Iterator[Job]:
@@ -65,22 +65,25 @@ def iterate_results(
     function: Callable[[Any], Any],
     jobs: Iterable[Job],
 ) -> Iterator[tuple[str, Any]]:
-    """Yield every job's key and result as they are done.
+    """Yield the key and the result of every job, in the order in which they finish.
 
     Parameters
     ----------
     workers : Workers
-        Who does the jobs. A job whose worker dies is given out again.
+        Workers that do the jobs. A job whose worker dies is submitted again.
     function : callable
-        Of a module; called with a job's argument.
+        Function of a module, so that processes can import it. It is called with a job's argument.
     jobs : iterable of (str, object)
-        Key and argument, taken as workers become free: as many may follow as there is time for.
+        Key and argument of each job. Jobs are drawn as workers become free, so the iterable may
+        be endless.
 
     Raises
     ------
     RigtwinError
-        If workers keep dying over a job. What a job raises is raised too.
+        If workers keep dying over a job. Errors of a job propagate.
     """
+    # Futures report themselves to a queue: unlike waiting on a set of futures, a queue costs the
+    # same for any number of pending jobs.
     coming = iter(jobs)
     finished: SimpleQueue[Any] = SimpleQueue()
     waiting: dict[Any, Job] = {}
@@ -91,6 +94,7 @@ def iterate_results(
         waiting[future] = job
         future.add_done_callback(finished.put)
 
+    # Enough jobs are in transit that no worker waits, and no more: memory stays bounded.
     ahead = workers.ahead * workers.capacity
     try:
         for job in islice(coming, ahead):
@@ -100,18 +104,22 @@ def iterate_results(
             key, argument = waiting.pop(future)
             try:
                 result = future.result()
+            # A dead worker may be chance, such as a lack of memory, so the job gets further
+            # attempts.
             except workers.lost:
                 losses[key] += 1
                 if losses[key] >= MOST_LOSSES:
-                    why = "out of memory, killed, or it could not start"
-                    told = f"a worker died {MOST_LOSSES} times over {key}: {why}"
-                    raise RigtwinError(told) from None
+                    causes = "out of memory, killed, or it could not start"
+                    raise RigtwinError(
+                        f"a worker died {MOST_LOSSES} times over {key}: {causes}"
+                    ) from None
                 submit((key, argument))
                 continue
             losses.pop(key, None)
             yield key, result
             for job in islice(coming, ahead - len(waiting)):
                 submit(job)
+    # Also runs when the consumer stops early or an error propagates.
     finally:
         for future in waiting:
             future.cancel()

@@ -16,20 +16,26 @@ from typing import Any
 
 import threadpoolctl
 
-from rigtwin.interruptions import held_back
+from rigtwin.interruptions import block_sigint
 
 ENDING = 2.0
-"""s that a worker may take to end."""
+"""Time a worker may take to end, in s."""
 
 
 def _set_up(folder: str) -> None:
-    """In a worker: leave interruptions to the parent, end with it, keep to one core, and put
-    temporary files where the parent clears them away."""
+    """Prepare a worker process.
+
+    The worker ignores interruptions, which the parent handles, and ends with the parent. It uses
+    one core, and puts temporary files where the parent deletes them.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    # A killed worker cannot clean up; the parent deletes the folder.
     tempfile.tempdir = folder
+    # The sweep already uses every core; threads of linear algebra would compete for them.
     threadpoolctl.threadpool_limits(1)
     parent = multiprocessing.parent_process()
 
+    # A killed parent cannot tell its workers to end; this thread notices and ends the worker.
     def follow_parent() -> None:
         if parent is not None:
             parent.join()
@@ -39,12 +45,12 @@ def _set_up(folder: str) -> None:
 
 
 class Processes:
-    """A number of processes. One that dies breaks the pool, which is then made anew.
+    """Pool of worker processes. A pool that breaks because a process died is replaced.
 
     Parameters
     ----------
     capacity : int
-        How many.
+        Number of processes.
     """
 
     ahead = 3
@@ -56,12 +62,14 @@ class Processes:
         self._pool = self._start()
 
     def _start(self) -> ProcessPoolExecutor:
+        # Forking would copy threads' locks in whatever state they are; spawn starts afresh.
         spawn = multiprocessing.get_context("spawn")
         return ProcessPoolExecutor(self.capacity, spawn, _set_up, (self._folder.name,))
 
     def submit(self, function: Callable[[Any], Any], argument: Any) -> Future[Any]:
-        """Give a job to the pool."""
-        with held_back():
+        """Submit a job to the pool."""
+        # submit() may start processes; Ctrl-C in between would leave the pool half started.
+        with block_sigint():
             try:
                 return self._pool.submit(function, argument)
             except BrokenProcessPool:
@@ -70,7 +78,7 @@ class Processes:
                 return self._pool.submit(function, argument)
 
     def next(self, finished: SimpleQueue[Any]) -> Any:
-        """Wait for the next future that is done."""
+        """Wait for the next finished future."""
         return finished.get()
 
     def __enter__(self) -> Processes:
@@ -81,10 +89,10 @@ class Processes:
             if kind is None:
                 self._pool.shutdown()
                 return
-            # Interrupted: what is half done is not worth waiting for.
+            # After an interruption, results in progress are not worth waiting for.
             self._pool.shutdown(wait=False, cancel_futures=True)
-            left = multiprocessing.active_children()
-            for process in left:
+            remaining = multiprocessing.active_children()
+            for process in remaining:
                 process.terminate()
-            for process in left:
+            for process in remaining:
                 process.join(ENDING)

@@ -1,4 +1,4 @@
-"""Results on disk, key → result, each there as a whole or not at all, whatever ends the program."""
+"""Results on disk by key, where each is written completely or not at all."""
 
 from __future__ import annotations
 
@@ -17,10 +17,11 @@ from rigtwin.studies.sweep.digest import source_digest
 
 
 def _encode(value: object) -> object:
-    """Write arrays, which JSON does not have, bit for bit."""
+    """Encode arrays, which JSON lacks, bit for bit as base64 text."""
     if isinstance(value, np.ndarray):
         stream = io.BytesIO()
         np.save(stream, value, allow_pickle=False)
+        # numpy's own format preserves every bit; decimal text would not guarantee it.
         return {"array": base64.b64encode(stream.getvalue()).decode()}
     if isinstance(value, np.generic):
         return value.item()
@@ -29,27 +30,28 @@ def _encode(value: object) -> object:
 
 
 def _decode(table: dict[str, Any]) -> object:
+    """Decode arrays; the inverse of `_encode`."""
     if table.keys() == {"array"}:
         return np.load(io.BytesIO(base64.b64decode(table["array"])), allow_pickle=False)
     return table
 
 
 class Store:
-    """Results of this version's sources in a SQLite file, used by one program at a time.
+    """Results in a SQLite file, for one program at a time.
 
-    Those of other sources are dropped.
+    Results of other sources than this version's are deleted on opening.
 
     Parameters
     ----------
     path : Path
-        The file; its folder is made.
+        Path of the file. Its folder is created.
     context : str, optional
-        What all results depend on; a digest of the sources unless said.
+        Digest of what all results depend on. Defaults to the digest of the sources.
 
     Raises
     ------
     RigtwinError
-        If the file cannot be used.
+        If the file cannot be used, or another program uses it.
     """
 
     def __init__(self, path: Path, context: str | None = None) -> None:
@@ -57,12 +59,13 @@ class Store:
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             self._base = sqlite3.connect(path, isolation_level=None, timeout=0.2)
-            # Exclusive from here on; a write ahead log survives being killed and needs no flush
-            # at each result.
+            # Exclusive from here on. A write-ahead log survives a killed program, and needs no
+            # flush to disk at each result.
             for line in ("locking_mode=EXCLUSIVE", "journal_mode=WAL", "synchronous=NORMAL"):
                 self._base.execute(f"PRAGMA {line}")
             columns = "context TEXT, key TEXT, result TEXT, PRIMARY KEY (context, key)"
             self._base.execute(f"CREATE TABLE IF NOT EXISTS results ({columns})")
+            # Results of other sources would be wrong for this version, so they are dropped.
             self._context = source_digest() if context is None else context
             self._base.execute("DELETE FROM results WHERE context <> ?", (self._context,))
         except OSError as error:
@@ -71,6 +74,7 @@ class Store:
             raise self._fault(error) from None
 
     def _fault(self, error: sqlite3.DatabaseError) -> RigtwinError:
+        """Return the error to raise for an error of SQLite."""
         if "locked" in str(error):
             advice = "wait for it, or name another folder"
             return RigtwinError(f"{self.path} is in use by another run; {advice}")
@@ -90,7 +94,7 @@ class Store:
             raise self._fault(error) from None
 
     def __getitem__(self, key: str) -> Any:
-        """The result of that key. Raises KeyError if there is none."""
+        """Return the result of a key. Raise KeyError if there is none."""
         query = "SELECT result FROM results WHERE context = ? AND key = ?"
         rows = self._rows(query, self._context, key)
         if not rows:
@@ -101,7 +105,7 @@ class Store:
             raise self._fault(sqlite3.DatabaseError("malformed")) from None
 
     def __setitem__(self, key: str, result: object) -> None:
-        """Raises RigtwinError if it cannot be written, such as on a full disk."""
+        """Store a result. Raise RigtwinError if it cannot be written, as on a full disk."""
         try:
             values = (self._context, key, json.dumps(result, default=_encode))
             self._base.execute("INSERT OR REPLACE INTO results VALUES (?, ?, ?)", values)
@@ -109,7 +113,7 @@ class Store:
             raise self._fault(error) from None
 
     def keys(self) -> Iterator[str]:
-        """Yield the keys of all results, in order."""
+        """Yield the keys of all results in alphabetical order."""
         query = "SELECT key FROM results WHERE context = ? ORDER BY key"
         for (key,) in self._rows(query, self._context):
             yield key

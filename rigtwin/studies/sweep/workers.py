@@ -1,6 +1,6 @@
-"""Who works: this process, processes on this computer, or a cluster.
+"""Workers of a sweep: this process, processes on this computer, or a cluster.
 
-Each gives the same results; only their order differs.
+All of them compute the same results; only the order differs.
 """
 
 from __future__ import annotations
@@ -13,10 +13,11 @@ from typing import Any, Protocol
 from rigtwin.errors import RigtwinError
 
 MOST_WORKERS = 1024
+"""Upper bound on processes, against a slip of the hand."""
 
 
 class Future(Protocol):
-    """What concurrent.futures and dask both give back for a job."""
+    """Interface that futures of concurrent.futures and of dask have in common."""
 
     def result(self) -> Any: ...
     def cancel(self) -> Any: ...
@@ -24,16 +25,16 @@ class Future(Protocol):
 
 
 class Workers(Protocol):
-    """Those who do jobs; a context manager that ends with them.
+    """Interface of a pool of workers; a context manager that ends them.
 
     Attributes
     ----------
     ahead : int
-        Jobs given out for each that is done at a time, so that none waits for the next.
+        Number of jobs submitted per unit of capacity, so that no worker waits for its next job.
     lost : tuple of exception types
-        Those that mean a worker died, not that its job failed.
+        Exception types that mean the worker died, not that the job failed.
     capacity : int
-        Jobs that are done at a time.
+        Number of jobs that are done at a time.
     """
 
     ahead: int
@@ -42,11 +43,11 @@ class Workers(Protocol):
     @property
     def capacity(self) -> int: ...
     def submit(self, function: Callable[[Any], Any], argument: Any) -> Future:
-        """Give out a job."""
+        """Submit a job."""
         ...
 
     def next(self, finished: SimpleQueue[Any]) -> Any:
-        """Wait for the next future that is done; RigtwinError if nobody is left to finish any."""
+        """Wait for the next finished future. Raise RigtwinError if no worker remains."""
         ...
 
     def __enter__(self) -> Workers: ...
@@ -54,7 +55,7 @@ class Workers(Protocol):
 
 
 class _Finished:
-    """A job done when it was given."""
+    """Future of a job that was done on submission."""
 
     def __init__(self, result: Any) -> None:
         self._result = result
@@ -68,8 +69,11 @@ class _Finished:
         fn(self)
 
 
-class Here:
-    """This process, one job after the other; each is handed on before the next begins."""
+class SerialExecutor:
+    """Worker that does one job after another in this process.
+
+    A result is yielded before the next job begins.
+    """
 
     ahead = 1
     lost: tuple[type[BaseException], ...] = ()
@@ -80,7 +84,7 @@ class Here:
         return _Finished(function(argument))
 
     def next(self, finished: SimpleQueue[Any]) -> Any:
-        """The future that was done last."""
+        """Return the future of the job done last."""
         return finished.get()
 
     def __enter__(self) -> Workers:
@@ -90,32 +94,34 @@ class Here:
 
 
 def open_workers(workers: int | None = None, cluster: str | None = None) -> Workers:
-    """Open workers as `--workers` and `--cluster` say.
+    """Open the workers that the options `--workers` and `--cluster` ask for.
 
     Parameters
     ----------
     workers : int, optional
-        Processes on this computer; one a core unless said.
+        Number of processes on this computer. Defaults to one per core.
     cluster : str, optional
-        The address of a cluster's scheduler, instead.
+        Address of a cluster's scheduler, in place of processes.
 
     Raises
     ------
     RigtwinError
-        For a number that makes no sense, an address that does not answer, or a missing package.
+        If the number is out of range, the address does not answer, or a package is missing.
     """
     if cluster is not None:
         if workers is not None:
-            given = f"workers {workers}, cluster {cluster}"
-            raise RigtwinError(f"{given}: expected one of them; a cluster brings its own workers")
+            options = f"workers {workers}, cluster {cluster}"
+            raise RigtwinError(f"{options}: expected one of them; a cluster has its own workers")
+        # Imported only if asked for: dask is an optional dependency.
         from rigtwin.studies.sweep.cluster import Cluster
 
         return Cluster(cluster)
     count = (os.cpu_count() or 1) if workers is None else workers
     if not 1 <= count <= MOST_WORKERS:
         raise RigtwinError(f"workers {count}: expected 1 to {MOST_WORKERS}")
+    # One worker needs no process of its own; errors then have a plain traceback.
     if count == 1:
-        return Here()
+        return SerialExecutor()
     from rigtwin.studies.sweep.processes import Processes
 
     return Processes(count)

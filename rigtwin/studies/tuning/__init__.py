@@ -1,1 +1,1 @@
-"""Settings tuned on the twin before the rig is touched."""
+"""Tuning of controller settings on the twin, before the rig is touched."""

@@ -1,4 +1,4 @@
-"""Runs candidates in scenarios, each once, and scores them."""
+"""Simulates candidates in scenarios, each pair once, and scores them."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ from rigtwin.studies.tuning.study import Study
 
 @dataclass(frozen=True)
 class Score:
-    """What a candidate came to over scenarios.
+    """Score of a candidate over scenarios.
 
     Parameters
     ----------
     figures : dict
-        Measure → the study's quantile of it, not a number if any run tripped.
+        Measure → the study's quantile of it; NaN if any run tripped.
     limits : float
-        The largest share of a safety limit in any run.
+        Largest share of a safety limit reached in any run.
     trips : float
-        Share of runs that tripped.
+        Share of the runs that tripped.
     """
 
     figures: dict[str, float]
@@ -40,18 +40,18 @@ class Score:
 
 @dataclass(frozen=True)
 class Bench:
-    """Where the runs of one study are made and kept.
+    """Runs of one study: what is run, by whom, and where results are stored.
 
     Parameters
     ----------
     study : Study
-        Whose runs.
+        Study that the runs belong to.
     store : Store
-        Where they are kept.
+        Store of the results.
     workers : Workers
-        Who makes them.
+        Workers that simulate the runs.
     progress : callable, optional
-        Called with 1 for each run.
+        Function called with 1 for each run.
     """
 
     study: Study
@@ -60,10 +60,11 @@ class Bench:
     progress: Callable[[int], object] = lambda _: None
 
     def plan(self, base: Configuration, candidate: Settings, scenario: Scenario) -> Run:
-        """The run of a candidate in a scenario. base: the configuration of everything else."""
+        """Return the run of a candidate in a scenario, with `base` for everything else."""
         return Run(
             machine=str(self.study.machine.path),
             experiment=self.study.experiment,
+            # The candidate is the controller, the scenario is the plant; all else is the study's.
             configuration=base._replace(controller=candidate, plant=scenario.plant),
             seed=scenario.seed,
             first=self.study.first,
@@ -76,14 +77,26 @@ class Bench:
         candidates: Sequence[Settings],
         scenarios: Sequence[Scenario],
     ) -> list[list[dict[str, float]]]:
-        """Run every candidate in every scenario.
+        """Simulate every candidate in every scenario.
+
+        Parameters
+        ----------
+        base : Configuration
+            Configuration of everything but controller and plant.
+        candidates : sequence of Settings
+            Settings of the controller.
+        scenarios : sequence of Scenario
+            Roads, noise and rigs.
 
         Returns
         -------
         list
-            A row a candidate: for each scenario name → figure, as `run.run` gives it.
+            One row per candidate; for each scenario the figures by name, as `run.run` returns them.
         """
-        jobs = [[self.plan(base, each, scenario) for scenario in scenarios] for each in candidates]
+        jobs = [
+            [self.plan(base, candidate, scenario) for scenario in scenarios]
+            for candidate in candidates
+        ]
         keys = [[job.key for job in row] for row in jobs]
         flat = zip(chain.from_iterable(keys), chain.from_iterable(jobs), strict=True)
         run_jobs(self.store, self.workers, run, flat, self.progress)
@@ -95,6 +108,7 @@ class Bench:
         return [self._score(row) for row in rows]
 
     def _score(self, runs: Sequence[dict[str, float]]) -> Score:
+        """Summarise the runs of one candidate."""
         figures = {}
         for measure in self.study.goals.measures:
             values = [run[measure.name] for run in runs]
@@ -104,8 +118,9 @@ class Bench:
 
 
 def quantile(measure: Measure, values: Sequence[float] | Array, share: float) -> float:
-    """The value that this share of runs is no worse than; not a number if any is none."""
+    """Return the value that a share of the runs is no worse than; NaN if any value is NaN."""
     numbers = np.asarray(values, dtype=float)
     if np.isnan(numbers).any():
+        # One trip makes the figure NaN: a candidate that trips has no score.
         return float("nan")
     return float(np.quantile(numbers, 1.0 - share if measure.more else share))

@@ -1,6 +1,6 @@
-"""What tuned settings are worth on roads and rigs that the search has not seen.
+"""Evaluation of tuned settings on roads and rigs that the search did not use.
 
-They are run beside the settings that they are compared with, in the same scenarios.
+Tuned settings and the settings they are compared with run in the same scenarios.
 """
 
 from __future__ import annotations
@@ -21,42 +21,43 @@ from rigtwin.studies.tuning.run import LIMITS, TRIP
 from rigtwin.studies.tuning.scenario import Scenario
 
 Figures = Mapping[str, float]
-"""Of a run: name → figure, as `rigtwin.studies.tuning.run` gives it."""
+"""Figures of a run by name, as `rigtwin.studies.tuning.run` returns them."""
 
 
 @dataclass(frozen=True)
 class Spread:
-    """Median, and the 5 and 95 % quantiles, over scenarios."""
+    """Median, 5 % and 95 % quantile over scenarios."""
 
     median: float
     low: float
     high: float
 
     @staticmethod
-    def of(values: Array) -> Spread:
-        """The spread of a measure's values, one a scenario."""
+    def from_values(values: Array) -> Spread:
+        """Return the spread of a measure's values, one value per scenario."""
         low, middle, high = np.quantile(values, [0.05, 0.5, 0.95])
         return Spread(float(middle), float(low), float(high))
 
 
 @dataclass(frozen=True)
-class Change:
-    """How a measure changed in the same scenario.
+class MeasureChange:
+    """Change of a measure between two settings in the same scenarios.
 
     Parameters
     ----------
     measure : Measure
-        What changed.
+        Measure that changed.
     before, after : Spread
-        Over scenarios.
+        Spread over scenarios with either settings.
     median, low, high : float
-        Of the change, with the median's 95 % interval, which is not numbers below six runs.
+        Median of the change, and the 95 % interval of the median; NaN for fewer than six runs.
     better : float
-        Share of scenarios in which it did not get worse.
+        Share of scenarios in which the measure did not get worse.
     relative : bool
-        Whether the change is in % of before, or in the measure's unit, where it can be zero.
+        Whether the change is in % of `before`; otherwise it is in the measure's unit, because
+        `before` can be zero.
     quantile : float
-        The study's quantile of it after.
+        The study's quantile of the measure after the change.
     """
 
     measure: Measure
@@ -71,48 +72,50 @@ class Change:
 
     @property
     def improved(self) -> bool:
-        """Whether its interval lies on the better side."""
+        """Whether the interval of the change lies on the better side of zero."""
         return self.low > 0.0 if self.measure.more else self.high < 0.0
 
 
 @dataclass(frozen=True)
-class Comparison:
-    """Settings against others over the same scenarios.
+class SettingsComparison:
+    """Comparison of two settings over the same scenarios.
 
     Parameters
     ----------
     rig, settings, against : str
-        Names of the rig, the settings, and those that they are compared with.
-    changes : tuple of Change
-        One a measure; none where no runs are left to compare.
+        Names of the rig, of the settings, and of the settings they are compared with.
+    changes : tuple of MeasureChange
+        One change per measure; none if no runs remain to compare.
     trips : tuple of float
-        Share of runs that tripped, before and after.
+        Share of the runs that tripped, before and after.
     limits : float
-        The largest share of a safety limit that the settings reached.
+        Largest share of a safety limit reached with the settings.
     runs : int
-        Those compared, in which neither tripped.
+        Number of compared runs, in which neither settings tripped.
     """
 
     rig: str
     settings: str
     against: str
-    changes: tuple[Change, ...]
+    changes: tuple[MeasureChange, ...]
     trips: tuple[float, float]
     limits: float
     runs: int
 
-    def of(self, name: str) -> Change:
-        """The change of a measure by name."""
+    def change_of(self, name: str) -> MeasureChange:
+        """Return the change of the named measure."""
         return next(change for change in self.changes if change.measure.name == name)
 
 
 def median_interval(values: Array, confidence: float = 0.95) -> tuple[float, float]:
-    """Interval of the median of whatever the values are drawn from.
+    """Return a confidence interval of the median of the values' distribution.
 
-    The ends are the order statistics that the binomial distribution says; not numbers where even
-    the extremes do not hold the median so often.
+    The number of values below the median has the binomial distribution B(n, 1/2), whatever the
+    values' distribution. The ends are the order statistics it selects. NaN if even the extremes
+    do not reach the confidence.
     """
     ordered, count = np.sort(values), len(values)
+    # P(median below the rank-th value) = P(B(n, 1/2) < rank).
     rank = int(binom.ppf((1.0 - confidence) / 2.0, count, 0.5))
     if rank < 1:
         return math.nan, math.nan
@@ -125,8 +128,8 @@ def evaluate(
     scenarios: Sequence[Scenario],
     before: tuple[str, Settings],
     after: tuple[str, Settings],
-) -> Comparison:
-    """Run both settings, each with its name, in every scenario, and compare them."""
+) -> SettingsComparison:
+    """Run two settings, each given with its name, in every scenario, and compare them."""
     study = bench.study
     first, second = bench.run(study.configuration, [before[1], after[1]], scenarios)
     measures = study.goals.measures
@@ -139,26 +142,27 @@ def compare(
     before: tuple[str, Sequence[Figures]],
     after: tuple[str, Sequence[Figures]],
     share: float = 0.5,
-) -> Comparison:
-    """Compare runs of two settings in the same scenarios.
+) -> SettingsComparison:
+    """Compare the runs of two settings in the same scenarios.
 
     Parameters
     ----------
     measures : sequence of Measure
-        What is compared.
+        Measures that are compared.
     rig : str
-        Name of the rig that was run.
+        Name of the rig.
     before, after : (str, sequence of mapping)
         Name of the settings, and the figures of their run in each scenario.
     share : float, optional
-        The quantile that the settings are scored by.
+        Quantile that the settings are scored by.
     """
     (against, first), (settings, second) = before, after
     pairs = list(zip(first, second, strict=True))
+    # A run that tripped has no figures, so its scenario is left out for both settings.
     complete = [pair for pair in pairs if all(_is_complete(run, measures) for run in pair)]
     trips = [float(np.mean([run[TRIP] != Trip.NONE for run in runs])) for runs in (first, second)]
-    changes = [_change(each, complete, share) for each in measures] if complete else []
-    return Comparison(
+    changes = [_change(measure, complete, share) for measure in measures] if complete else []
+    return SettingsComparison(
         rig=rig,
         settings=settings,
         against=against,
@@ -169,16 +173,21 @@ def compare(
     )
 
 
-def _change(measure: Measure, pairs: Sequence[tuple[Figures, Figures]], share: float) -> Change:
+def _change(
+    measure: Measure, pairs: Sequence[tuple[Figures, Figures]], share: float
+) -> MeasureChange:
+    """Return the change of one measure over pairs of runs in the same scenario."""
     before, after = (np.array([pair[side][measure.name] for pair in pairs]) for side in (0, 1))
+    # Pairing removes the scatter between roads: the median is that of the changes, not the change
+    # of the medians.
     relative = not measure.more and bool(np.all(before > 0.0))
     change = 100.0 * (after / before - 1.0) if relative else after - before
     worse = change < 0.0 if measure.more else change > 0.0
     low, high = median_interval(change)
-    return Change(
+    return MeasureChange(
         measure=measure,
-        before=Spread.of(before),
-        after=Spread.of(after),
+        before=Spread.from_values(before),
+        after=Spread.from_values(after),
         median=float(np.median(change)),
         low=low,
         high=high,
@@ -189,5 +198,5 @@ def _change(measure: Measure, pairs: Sequence[tuple[Figures, Figures]], share: f
 
 
 def _is_complete(run: Figures, measures: Sequence[Measure]) -> bool:
-    """Whether a run lived to show every measure."""
-    return run[TRIP] == Trip.NONE and all(math.isfinite(run[each.name]) for each in measures)
+    """Return whether a run did not trip and has a finite figure for every measure."""
+    return run[TRIP] == Trip.NONE and all(math.isfinite(run[measure.name]) for measure in measures)

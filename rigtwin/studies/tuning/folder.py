@@ -1,4 +1,4 @@
-"""A study's folder: settings to run, a recording of the best, tables, pictures, one page."""
+"""Results folder of a study: settings to run, a recording of the best, tables, pictures, a page."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from rigtwin.description.configuration import Configuration
 from rigtwin.errors import RigtwinError
 from rigtwin.render.plot import save
 from rigtwin.studies.tuning import text
-from rigtwin.studies.tuning.evaluation import Comparison
+from rigtwin.studies.tuning.evaluation import SettingsComparison
 from rigtwin.studies.tuning.pictures import draw
 from rigtwin.studies.tuning.result import TuningResult
 from rigtwin.studies.tuning.run import LIMITS
@@ -24,39 +24,39 @@ from rigtwin.studies.tuning.study import Study
 
 RUNS, SETTINGS, BEST, PAGE = "runs.sqlite", "tuned.toml", "best.mcap", "index.html"
 CAPTIONS = {
-    "front": "Each point is a candidate; none of the front is beaten in both.",
+    "front": "Each point is a candidate; no candidate is better than the front in both objectives.",
     "held-out": "Change in the same scenario; points are medians, bars their 95 % intervals.",
-    "search": "What the search tried, in order.",
+    "search": "Candidates in the order in which the search tried them.",
     "parameters": "The first objective of every candidate over each parameter.",
 }
 
 
 def default_folder(study: Study) -> Path:
-    """Where the results of a study go unless it is said."""
+    """Return the folder for a study's results if the user names none."""
     return Path("tuning") / study.name
 
 
 def write(folder: Path, result: TuningResult, twin: Configuration) -> list[Path]:
-    """Write everything that came out of a study.
+    """Write all results of a study.
 
     Parameters
     ----------
     folder : Path
-        Where to; it is made. Of an earlier study nothing stays that is not written again.
+        Folder to write to; it is created. Files of an earlier study are deleted.
     result : TuningResult
-        What came out.
+        Results of the study.
     twin : Configuration
-        The rig that the best is recorded on.
+        Configuration of the rig that the best settings are recorded on.
 
     Returns
     -------
     list of Path
-        What was written.
+        Paths of the files written.
 
     Raises
     ------
     RigtwinError
-        If it cannot be written.
+        If a file cannot be written.
     """
     figures = draw(result)
     pages = {
@@ -73,12 +73,14 @@ def write(folder: Path, result: TuningResult, twin: Configuration) -> list[Path]
         for old in (*folder.glob("tuned*.toml"), *(folder / f"{name}.png" for name in CAPTIONS)):
             old.unlink(missing_ok=True)
         for name, content in pages.items():
+            # Written beside its place and renamed: a reader never sees half a page.
             temporary = folder / f".{name}.new"
             temporary.write_text(content, encoding="utf-8")
             temporary.replace(folder / name)
     except OSError as error:
         raise RigtwinError(f"cannot write into {folder}: {error.strerror}") from None
     for name, figure in figures.items():
+        # The page contains the figures as SVG; the PNG files are for documents.
         save(figure, folder / f"{name}.png")
     _record(folder / BEST, result, twin)
     names = (*pages, *(f"{name}.png" for name in figures), BEST)
@@ -86,9 +88,10 @@ def write(folder: Path, result: TuningResult, twin: Configuration) -> list[Path]
 
 
 def _record(path: Path, result: TuningResult, twin: Configuration) -> None:
-    """Record the tuned settings on the first held-out road."""
+    """Record a test with the tuned settings on the first held-out road."""
     experiment, machine = result.study.experiment, result.study.machine
     configuration = twin._replace(controller=result.settings)
+    # Seed APART is the first held-out road, which no run of the search has used.
     demands = experiment.demands(configuration, APART)
     machine.physics.record(path, machine, experiment.name, configuration, demands, APART)
 
@@ -100,31 +103,32 @@ def _csv(rows: list[list[object]]) -> str:
 
 
 def _candidates(result: TuningResult) -> str:
-    """Every candidate: its values, its score over the search's scenarios, whether allowed."""
+    """Return the table of candidates: values, scores over the search's scenarios, and `allowed`."""
     study = result.study
     keys = [parameter.key for parameter in study.parameters]
     names = [measure.name for measure in study.goals.measures]
     rows: list[list[object]] = [[*keys, *names, LIMITS, "trips", "allowed"]]
-    for each in result.candidates:
-        score = each.score
+    for candidate in result.candidates:
+        score = candidate.score
         figures = [score.figures[name] for name in names]
-        rows.append([*each.values, *figures, score.limits, score.trips, int(each.allowed)])
+        allowed = int(candidate.allowed)
+        rows.append([*candidate.values, *figures, score.limits, score.trips, allowed])
     return _csv(rows)
 
 
 def _held_out(result: TuningResult) -> str:
-    """Every comparison, a line a measure."""
+    """Return the table of comparisons, one line per measure."""
     spreads = [f"{when}_{what}" for when in ("before", "after") for what in ("median", "5%", "95%")]
     names = ["rig", "settings", "against", "measure", "unit", *spreads]
     rows: list[list[object]] = [
         [*names, "change", "low", "high", "change_in", "no_worse", "runs"],
     ]
-    for each in (*result.comparisons, *result.front_comparisons):
-        rows += _rows(each)
+    for comparison in (*result.comparisons, *result.front_comparisons):
+        rows += _rows(comparison)
     return _csv(rows)
 
 
-def _rows(comparison: Comparison) -> list[list[object]]:
+def _rows(comparison: SettingsComparison) -> list[list[object]]:
     rows: list[list[object]] = []
     for change in comparison.changes:
         row: list[object] = [comparison.rig, comparison.settings, comparison.against]
@@ -138,14 +142,16 @@ def _rows(comparison: Comparison) -> list[list[object]]:
 
 
 def _svg(figure: Figure) -> str:
+    """Return a figure as SVG that does not change from run to run."""
     stream = io.StringIO()
+    # A fixed salt and no date keep the text identical for identical results.
     with mpl.rc_context({"svg.fonttype": "none", "svg.hashsalt": "rigtwin"}):
         figure.savefig(stream, format="svg", metadata={"Date": None})
     return stream.getvalue()[stream.getvalue().index("<svg") :]
 
 
 def _page(result: TuningResult, figures: dict[str, Figure]) -> str:
-    """One HTML file: no network, no script."""
+    """Return the page as one HTML file without network access or scripts."""
     environment = Environment(
         loader=PackageLoader("rigtwin.studies.tuning"),
         autoescape=True,

@@ -1,4 +1,4 @@
-"""What a test is measured by: the objectives of tuning, each defined once."""
+"""Measures of a test: the objectives of tuning, defined in one place."""
 
 from __future__ import annotations
 
@@ -21,22 +21,22 @@ from rigtwin.simulation.metrics import Tracking, compute_tracking
 from rigtwin.studies.stability.sampled_loop import decay
 
 HEAVE = 3.0
-"""Hz; up to which a body on this suspension heaves. Above, from 3.4 Hz on, the plate carries the
-limit cycle by friction."""
+"""Upper limit of the body's heave on this suspension, in Hz. From 3.4 Hz on, the plate's motion
+contains the limit cycle that friction causes."""
 
 
 @dataclass(frozen=True)
 class Trial:
-    """A test that was run to its end.
+    """Test that ran to its end.
 
     Parameters
     ----------
     configuration : Configuration
-        What it was run with.
+        Configuration of the test.
     columns : mapping
         Topic → field → signal, shape (ticks,).
     first : int
-        Tick from which on it is measured.
+        First tick that is measured.
     """
 
     configuration: Configuration
@@ -45,45 +45,48 @@ class Trial:
 
     @property
     def period(self) -> float:
-        """s."""
+        """Period of a tick, in s."""
         return self.configuration.timing.period
 
 
 @dataclass(frozen=True)
 class RigTrial(Trial):
-    """A test of the suspension rig; its sensors are without noise where a twin knows them."""
+    """Test of the suspension rig. On a twin the sensors are taken without noise."""
 
     @cached_property
     def commands(self) -> Array:
-        """Shape (ticks, 4), columns of `controllers.Commands`."""
+        """Commands, shape (ticks, 4), in the order of `controllers.Commands`."""
         return np.column_stack([self.columns["/command"][name] for name in Commands._fields])
 
     @cached_property
     def sensed(self) -> Array:
-        """Shape (ticks, 4), columns of `controllers.Measurements`."""
+        """Sensors, shape (ticks, 4), in the order of `controllers.Measurements`."""
         return np.column_stack([self.columns["/sensor"][name] for name in Measurements._fields])
 
     @property
     def plate(self) -> Array:
-        """Its position, m."""
+        """Position of the plate, in m."""
         return self.sensed[self.first :, 1]
 
     @property
     def travel(self) -> Array:
-        """The suspension's, m."""
+        """Travel of the suspension, in m."""
         return self.sensed[self.first :, 2]
 
     @property
     def tyre(self) -> Array:
-        """The tyre's force, N."""
+        """Force of the tyre, in N."""
+        # Ground minus wheel, where the wheel stands at plate minus travel.
         deflection = self.sensed[:, 0] - self.sensed[:, 1] + self.sensed[:, 2]
         rate = np.gradient(deflection, self.period)
         return tyre_force(self.configuration.plant.tyre, deflection, rate)[self.first :]
 
     @cached_property
     def tracking(self) -> Tracking:
-        """The errors of thesis Eq. 3.1 and 3.2 against the ideal vehicle."""
+        """Errors against the ideal vehicle (thesis Eq. 3.1 and 3.2)."""
+        # Simulated from the start, so that the ideal vehicle is settled when measuring begins.
         target = simulate_ideal(self.configuration, self.commands[:, 0])
+        # The transient before `first` is no property of the settings.
         late = slice(self.first, None)
         motions = (target.structure[late], target.velocity[late], target.wheel[late])
         shown = Ideal(*motions, target.force[late], None)
@@ -92,28 +95,28 @@ class RigTrial(Trial):
 
 @dataclass(frozen=True)
 class Measure:
-    """One figure of a test.
+    """Definition of one figure of a test.
 
     Parameters
     ----------
     name, title, unit : str
-        What studies call it, what it is in words, its SI unit.
-    of : callable
-        The figure of a trial; a function or an object that other processes can be given.
+        Name in studies, title in words, and SI unit.
+    compute : callable
+        Function from a trial to the figure. It must be picklable, because workers receive it.
     more : bool, optional
-        Whether more of it is better.
+        Whether larger values are better.
     """
 
     name: str
     title: str
     unit: str
-    of: Callable[[Any], float]
+    compute: Callable[[Any], float]
     more: bool = False
 
     @property
-    def told(self) -> str:
-        """What a study says of it that defines it."""
-        return "" if isinstance(self.of, FunctionType) else repr(self.of)
+    def definition(self) -> str:
+        """Text that defines the measure, where a study does; empty for functions."""
+        return "" if isinstance(self.compute, FunctionType) else repr(self.compute)
 
 
 def _ride(trial: RigTrial) -> float:
@@ -121,6 +124,7 @@ def _ride(trial: RigTrial) -> float:
 
 
 def _heave(trial: RigTrial) -> float:
+    # Filtering forwards and backwards leaves no phase lag.
     low_pass = butter(2, HEAVE, fs=1.0 / trial.period, output="sos")
     return rms(np.diff(sosfiltfilt(low_pass, trial.plate), 2) / trial.period**2)
 
@@ -176,9 +180,9 @@ _ALL = (
         name="stability_margin",
         title="decay of the linear loop's slowest motion",
         unit="1/s",
-        of=_margin,
+        compute=_margin,
         more=True,
     ),
 )
 MEASURES = {measure.name: measure for measure in _ALL}
-"""By the names that studies take. Errors as in thesis Eq. 3.1, 3.2 and Table 4.2."""
+"""Measures by their names in studies. Errors are defined by thesis Eq. 3.1, 3.2 and Table 4.2."""

@@ -1,4 +1,4 @@
-"""Measures that a study defines: a formula of what a test records, and what is made of it."""
+"""Measures defined by a study: a statistic of a formula of recorded channels."""
 
 from __future__ import annotations
 
@@ -22,14 +22,17 @@ TIME = "time"
 
 
 def _deviation(signal: Array) -> float:
+    """Return the standard deviation."""
     return float(np.std(signal))
 
 
 def _mean(signal: Array) -> float:
+    """Return the mean."""
     return float(np.mean(signal))
 
 
 def _peak(signal: Array) -> float:
+    """Return the largest magnitude."""
     return float(np.max(np.abs(signal)))
 
 
@@ -39,36 +42,51 @@ STATISTICS: dict[str, Callable[[Array], float]] = {
     "mean": _mean,
     "peak": _peak,
 }
-"""What can be made of a formula's values over a test."""
+"""Statistics of a formula's values over a test, by name."""
 
 
 @dataclass(frozen=True)
 class FormulaFigure:
-    """text: the formula; statistic: of `STATISTICS`; channels: what its inputs are, in order."""
+    """Statistic of a formula over a test.
+
+    Attributes
+    ----------
+    text
+        The formula.
+    statistic
+        Name in `STATISTICS`.
+    channels
+        Channels of the formula's inputs, in order.
+    """
 
     text: str
     statistic: str
     channels: tuple[Channel, ...]
 
     def __call__(self, trial: Trial) -> float:
-        """The figure of a test."""
+        """Return the figure of a test; NaN if it is not finite."""
         ticks = len(next(iter(next(iter(trial.columns.values())).values())))
         time = np.arange(ticks) * trial.period
         inputs = [
             time if channel == ("", TIME) else trial.columns[channel[0]][channel[1]]
             for channel in self.channels
         ]
+        # A formula without inputs still needs a signal of the test's length.
         values = formula(self.text, {}).replayed({}, inputs or [time], trial.period)
-        found = STATISTICS[self.statistic](values[trial.first :])
-        return found if math.isfinite(found) else math.nan
+        figure = STATISTICS[self.statistic](values[trial.first :])
+        return figure if math.isfinite(figure) else math.nan
 
 
 LONGEST = 100
-"""Letters of a title."""
+"""Maximum number of characters of a title."""
 
 
 def list_channels(machine: Machine) -> dict[str, Channel]:
-    """Name in a formula → channel: components with one, fields of channels, and time."""
+    """Return the channels that formulas can use, by name.
+
+    Names are those of components with a channel, of channels' fields, and `time`.
+    """
+    # Later entries win: a component's name before a sensor's field, that before a demand's.
     channels = [c.channel for c in machine.components.values() if c.channel is not None]
     control = () if machine.control is None else machine.control.channels
     by_field = {channel[1]: channel for channel in (*control, *demanded_channels(machine))}
@@ -78,21 +96,21 @@ def list_channels(machine: Machine) -> dict[str, Channel]:
 
 
 def parse_measure(name: str, table: object, channels: Mapping[str, Channel]) -> Measure:
-    """A study's own measure.
+    """Parse a measure that a study defines.
 
     Parameters
     ----------
     name
-        What the study calls it.
+        Name of the measure.
     table
-        Its TOML table.
+        TOML table of the measure.
     channels
-        Name in a formula → channel.
+        Channels by their names in formulas.
 
     Raises
     ------
     RigtwinError
-        Naming the entry and what was expected.
+        If an entry is wrong; the message names it and what was expected.
     """
     where = f"measures.{name}"
     if not isinstance(table, Mapping):
@@ -100,12 +118,13 @@ def parse_measure(name: str, table: object, channels: Mapping[str, Channel]) -> 
     known = ("formula", "of", "unit", "title", "more")
     for key in table:
         if key not in known:
-            raise RigtwinError(f"{where}: unknown {key!r}; there are {', '.join(known)}")
+            raise RigtwinError(f"{where}: unknown {key!r}; expected {', '.join(known)}")
     text, statistic, more = table.get("formula"), table.get("of", "rms"), table.get("more", False)
     words: dict[str, Any] = {"unit": table.get("unit", "1"), "title": table.get("title", name)}
     for key, value in (("formula", text), *words.items()):
         if not isinstance(value, str) or not value.strip() or not value.isprintable():
             raise RigtwinError(f"{where}.{key} = {value!r:.60}: expected text of one line")
+    # matplotlib would typeset text between two $ as a formula.
     if len(words["title"]) > LONGEST or "$" in words["title"]:
         raise RigtwinError(
             f"{where}.title = {words['title']!r:.60}: expected at most {LONGEST} letters, none a $"
@@ -118,11 +137,13 @@ def parse_measure(name: str, table: object, channels: Mapping[str, Channel]) -> 
         inputs = formula(str(text), {}).inputs
     except ValueError as error:
         raise RigtwinError(f"{where}.formula: {error}") from None
-    for each in inputs:
-        if each not in channels:
-            there = ", ".join(channels)
-            raise RigtwinError(f"{where}.formula: unknown {each!r}; there are {there}")
+    for channel in inputs:
+        if channel not in channels:
+            expected = ", ".join(channels)
+            raise RigtwinError(f"{where}.formula: unknown {channel!r}; expected {expected}")
     if not inputs:
         raise RigtwinError(f"{where}.formula = {text!r:.60}: expected a channel in it")
-    figure = FormulaFigure(str(text), str(statistic), tuple(channels[each] for each in inputs))
+    figure = FormulaFigure(
+        str(text), str(statistic), tuple(channels[channel] for channel in inputs)
+    )
     return Measure(name, words["title"], words["unit"], figure, more)

@@ -1,4 +1,4 @@
-"""One run of one candidate in one scenario, in any process."""
+"""Simulation of one candidate in one scenario, in any process."""
 
 from __future__ import annotations
 
@@ -24,27 +24,28 @@ from rigtwin.simulation.structure_motion import models_output
 from rigtwin.studies.tuning.measures import Measure, RigTrial, Trial
 
 LIMITS, TRIP = "limits", "trip"
-"""Besides the measures: the largest share of a safety limit reached, and the number of a Trip."""
+"""Figures beside the measures: the largest share of a safety limit reached, and the number of a
+Trip."""
 
 
 @dataclass(frozen=True)
 class Run:
-    """A run to be made.
+    """Specification of a run.
 
     Parameters
     ----------
     machine : str
-        Path of the description of that whose twin is run.
+        Path of the machine's description.
     experiment : Experiment
-        The test.
+        Experiment of the run.
     configuration : Configuration
-        What it is run with.
+        Configuration of the run.
     seed : int
-        Of road and noise.
+        Seed of road and noise.
     first : float
-        s, from which on it is measured.
+        Time at which measuring begins, in s.
     measures : tuple of Measure
-        What it is measured by.
+        Measures of the run.
     """
 
     machine: str
@@ -56,29 +57,30 @@ class Run:
 
     @property
     def key(self) -> str:
-        """The same for the same run, whoever asks."""
-        told = [
+        """Digest that identifies the run in a store, equal for equal runs."""
+        identity = [
             self.experiment.name,
             flatten(self.configuration),
             self.seed,
             self.first,
-            sorted(f"{measure.name} {measure.told}" for measure in self.measures),
+            sorted(f"{measure.name} {measure.definition}" for measure in self.measures),
         ]
-        return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()[:32]
+        # Settings are hashed by value, so that equal runs of different studies share a result.
+        return hashlib.sha256(json.dumps(identity, sort_keys=True).encode()).hexdigest()[:32]
 
 
 find_once = lru_cache(maxsize=4)(find)
-"""A machine by name or path, read once a process."""
+"""Function that reads a machine by name or path, cached within a process."""
 
 
 def run(job: Run) -> dict[str, float]:
-    """Make a run on the twin.
+    """Simulate a run on the twin.
 
     Returns
     -------
     dict
-        Name → figure, of the measures, LIMITS and TRIP. The measures of a run that tripped, or of a
-        machine that ran away, are not numbers.
+        Figures by name: measures, LIMITS and TRIP. Measures are NaN if the run tripped or the
+        machine diverged.
     """
     machine = find_once(job.machine)
     demands = job.experiment.demands(job.configuration, job.seed)
@@ -86,23 +88,36 @@ def run(job: Run) -> dict[str, float]:
 
 
 def figures(job: Run, ran: SimulationResult) -> dict[str, float]:
-    """Name → figure of a run of the suspension rig, as `run` gives it."""
+    """Return the figures of a run of the suspension rig, as `run` does."""
+    # A margin of 0 is at the limit; the share reached is its complement.
     shares = (
         1.0 - peak.margin for peak in peaks(ran.commands, ran.measurements, job.configuration)
     )
-    found = {LIMITS: max(shares), TRIP: float(ran.trip)}
+    result = {LIMITS: max(shares), TRIP: float(ran.trip)}
     if ran.trip != Trip.NONE:
-        return found | _nothing(job)
+        return result | _no_measures(job)
+    # The models' output, not the compensated command, is compared with the ideal vehicle.
     asked = models_output(job.configuration, ran.commands, ran.measurements)
     trial = rig_trial(job.configuration, asked, ran.truth, _first(job))
-    return found | _measure(job, trial)
+    return result | _measure(job, trial)
 
 
 def rig_trial(
     configuration: Configuration, commands: Array, sensed: Array, first: int = 0
 ) -> RigTrial:
-    """A test of the suspension rig. commands: what its models asked for; sensed: both of shape
-    (ticks, 4), columns of `controllers.Commands` and `.Measurements`."""
+    """Return a trial of the suspension rig.
+
+    Parameters
+    ----------
+    configuration
+        Configuration of the test.
+    commands
+        Output of the rig's models, shape (ticks, 4), in the order of `controllers.Commands`.
+    sensed
+        Sensors, shape (ticks, 4), in the order of `controllers.Measurements`.
+    first
+        First tick that is measured.
+    """
     columns = {
         "/command": dict(zip(Commands._fields, commands.T, strict=True)),
         "/sensor": dict(zip(Measurements._fields, sensed.T, strict=True)),
@@ -115,23 +130,25 @@ def figures_of_joints(machine: Machine, job: Run, demands: Mapping[str, Array]) 
     try:
         columns, trip = simulate_machine(machine, job.configuration, demands, job.seed)
     except RunsAway:
-        return {LIMITS: RUNAWAY, TRIP: 1.0} | _nothing(job)
-    found = {
+        return {LIMITS: RUNAWAY, TRIP: 1.0} | _no_measures(job)
+    result = {
         LIMITS: largest_reach(machine, job.configuration, columns),
         TRIP: float(trip is not None),
     }
     if trip is not None:
-        return found | _nothing(job)
-    return found | _measure(job, Trial(job.configuration, columns, _first(job)))
+        return result | _no_measures(job)
+    return result | _measure(job, Trial(job.configuration, columns, _first(job)))
 
 
 def _first(job: Run) -> int:
+    """Return the first tick that is measured."""
     return round(job.first / job.configuration.timing.period)
 
 
-def _nothing(job: Run) -> dict[str, float]:
+def _no_measures(job: Run) -> dict[str, float]:
+    """Return NaN for every measure of a run that did not complete."""
     return {measure.name: math.nan for measure in job.measures}
 
 
 def _measure(job: Run, trial: Trial) -> dict[str, float]:
-    return {measure.name: float(measure.of(trial)) for measure in job.measures}
+    return {measure.name: float(measure.compute(trial)) for measure in job.measures}

@@ -1,6 +1,6 @@
-"""The circumstances of one run: a road and noise of its own, a rig as it may be.
+"""Scenarios: the road, the noise and the rig of one run.
 
-Every candidate meets the same ones.
+All candidates are simulated in the same scenarios.
 """
 
 from __future__ import annotations
@@ -17,19 +17,19 @@ from rigtwin.description.posterior import Changes, Posterior, shift_within, valu
 from rigtwin.studies.tuning.study import Study
 
 APART = 1_000_000
-"""Between the seeds of search and evaluation: no study has as many roads."""
+"""Offset between the seeds of search and evaluation; larger than any study's number of roads."""
 
 
 @dataclass(frozen=True)
 class Scenario:
-    """One road, its noise, and one rig.
+    """Road, noise and rig of one run.
 
     Parameters
     ----------
     seed : int
-        Of road and noise.
+        Seed of road and noise.
     plant : Plant
-        The rig.
+        Parameters of the rig.
     """
 
     seed: int
@@ -37,19 +37,20 @@ class Scenario:
 
 
 @dataclass(frozen=True)
-class Rig:
-    """What is known of a rig.
+class UncertainRig:
+    """Knowledge about a rig: a distribution of its parameters.
 
     Parameters
     ----------
     name : str
-        What it is called in tables.
+        Name in tables.
     draw : callable
-        Of a configuration and random numbers, the configuration with the rig as it may be.
+        Function of a configuration and a random generator that returns the configuration with a
+        rig drawn from the distribution.
     known : frozenset of str
-        `component.parameter` of what that draws, which is not varied again.
+        Parameters, `component.parameter`, that `draw` determines and tolerances must not vary.
     certain : mapping
-        Component → parameter → a value that it has for certain.
+        Component → parameter → value known with certainty.
     """
 
     name: str
@@ -58,30 +59,31 @@ class Rig:
     certain: Changes = field(default_factory=dict)
 
 
-NOMINAL = Rig("nominal twin", lambda configuration, _: configuration)
-"""The rig as the study has it."""
+NOMINAL = UncertainRig("nominal twin", lambda configuration, _: configuration)
+"""The rig as the study describes it."""
 
 
-def calibrated_rig(posterior: Posterior) -> Rig:
-    """The rig of a diagnosis, each value as uncertain as that left it."""
-    return Rig("calibrated twin", posterior.draw, frozenset(posterior.intervals))
+def calibrated_rig(posterior: Posterior) -> UncertainRig:
+    """Return the rig that a diagnosis found, with its remaining uncertainty."""
+    return UncertainRig("calibrated twin", posterior.draw, frozenset(posterior.intervals))
 
 
-def draw_scenarios(study: Study, rig: Rig, count: int, first: int) -> list[Scenario]:
-    """Draw scenarios, each from its seed alone, so that more of them leave the others as they are.
+def draw_scenarios(study: Study, rig: UncertainRig, count: int, first: int) -> list[Scenario]:
+    """Draw scenarios, each from its own seed.
 
-    Tolerances and varied parameters are uniform about the rig, cut off at the parameters' bounds.
+    More scenarios therefore leave the earlier ones unchanged. Tolerances and varied parameters are
+    uniform about the rig's values, and cut off at the parameters' bounds.
 
     Parameters
     ----------
     study : Study
-        Whose configuration and variation.
+        Study with the configuration and its variation.
     rig : Rig
-        What is known of the rig.
+        Knowledge about the rig.
     count : int
-        How many.
+        Number of scenarios.
     first : int
-        The first one's seed; the others follow.
+        Seed of the first scenario; the seeds are consecutive.
     """
     tolerances = study.machine.tolerances if study.variation.tolerances else ()
 
@@ -89,10 +91,13 @@ def draw_scenarios(study: Study, rig: Rig, count: int, first: int) -> list[Scena
         random = np.random.default_rng([seed, 3])
         configuration = rig.draw(study.configuration, random)
 
+        # The amount is drawn even for a known parameter, so that a calibrated and a nominal rig
+        # share the random numbers of all parameters after it.
         def shift(key: str, width: float) -> Configuration:
             amount = width * random.uniform(-1.0, 1.0)
             return configuration if key in rig.known else shift_within(configuration, key, amount)
 
+        # Tolerances come first and in a fixed order, so that each seed always draws the same rig.
         for tolerance in tolerances:
             width = study.variation.tolerances * tolerance.width(configuration.plant)
             configuration = shift(f"{tolerance.group}.{tolerance.parameter}", width)

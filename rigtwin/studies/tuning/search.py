@@ -1,8 +1,8 @@
-"""Looks for the best settings with scipy's differential evolution.
+"""Search for the best settings by scipy's differential evolution.
 
-A generation is scored at a time, so that workers have plenty to do. Every run is kept, and the
-search draws its numbers from its seed alone: begun again it goes the same way, without the runs
-that were made.
+A generation is scored at a time, so that workers are busy. Every run is stored, and the search's
+random numbers depend only on its seed. A search that is started again therefore takes the same path
+and skips the runs that exist.
 """
 
 from __future__ import annotations
@@ -23,28 +23,28 @@ from rigtwin.studies.tuning.parameter import set_values, values_at
 from rigtwin.studies.tuning.scenario import Scenario
 from rigtwin.studies.tuning.study import Constraint, Study
 
-PER_PARAMETER, FEWEST = 5, 8
-"""Candidates of a generation for each parameter, and at least."""
-LEAST = 5
-"""Candidates of a generation that scipy's search needs."""
+PER_PARAMETER, MIN_GENERATION = 5, 8
+"""Candidates per generation: number for each parameter, and minimum."""
+SCIPY_MINIMUM = 5
+"""Smallest generation that scipy's search accepts."""
 CONVERGED = 2e-3
-"""Spread of a generation's objective, as a share of it, at which the search ends."""
+"""Relative spread of a generation's objective at which the search ends."""
 TRIPPED = 10.0
-"""How badly a measure that no run lived to show violates its constraint."""
+"""Relative violation assigned to a measure that is missing because of a trip."""
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """Settings that were tried.
+    """Settings tried by the search.
 
     Parameters
     ----------
     values : tuple of float
-        One a parameter.
+        Value of each parameter.
     score : Score
-        What they came to over the search's scenarios.
+        Score over the search's scenarios.
     violations : tuple of float
-        Of trips, of limits, of each constraint; above 0 where violated.
+        Relative violations of trips, limits, and each constraint; above 0 where violated.
     """
 
     values: tuple[float, ...]
@@ -53,33 +53,33 @@ class Candidate:
 
     @property
     def allowed(self) -> bool:
-        """Whether it violates nothing."""
+        """Whether the candidate violates no constraint."""
         return max(self.violations) <= 0.0
 
     def cost(self, measure: Measure) -> float:
-        """The measure as something to be made small."""
+        """Return the measure with the sign that makes smaller better."""
         value = self.score.figures[measure.name]
         return -value if measure.more else value
 
 
-class Search:
-    """A study's candidates in its scenarios.
+class TuningSearch:
+    """Search of one study: its scenarios, and all candidates tried.
 
     Parameters
     ----------
     bench : Bench
-        Where they are scored.
+        Runs of the study.
     scenarios : sequence of Scenario
-        That every candidate meets.
+        Scenarios in which every candidate is simulated.
     seed : int
-        Of the search's random numbers.
+        Seed of the search's random numbers.
 
     Attributes
     ----------
     baseline : Score
-        Of the settings that are compared with.
+        Score of the baseline settings.
     candidates : dict
-        Values → candidate, all that were tried, in the order in which they were.
+        Values → candidate, in the order in which they were tried.
     """
 
     def __init__(self, bench: Bench, scenarios: Sequence[Scenario], seed: int) -> None:
@@ -87,36 +87,40 @@ class Search:
         study, settings = bench.study, bench.study.baseline_settings
         self.start = [getattr(settings, parameter.name) for parameter in study.parameters]
         (self.baseline,) = bench.score([settings], scenarios)
-        self.bounds = [bound_of(each, self.baseline) for each in study.goals.constraints]
+        self.bounds = [
+            bound_of(constraint, self.baseline) for constraint in study.goals.constraints
+        ]
         self.candidates: dict[tuple[float, ...], Candidate] = {}
 
     @property
     def study(self) -> Study:
-        """What is looked for."""
+        """Study that is tuned."""
         return self.bench.study
 
     @property
     def allowed(self) -> list[Candidate]:
-        """The candidates that violate nothing."""
-        return [each for each in self.candidates.values() if each.allowed]
+        """Candidates that violate no constraint."""
+        return [candidate for candidate in self.candidates.values() if candidate.allowed]
 
     def score(self, shares: Array) -> list[Candidate]:
-        """Score candidates given as shares between bounds, shape (candidates, parameters)."""
+        """Return the candidates at shares between bounds, shape (candidates, parameters)."""
         study = self.study
         asked = [values_at(study.parameters, row) for row in shares]
-        new = [each for each in dict.fromkeys(asked) if each not in self.candidates]
+        # Values are rounded, so different shares can be the same candidate: each runs once.
+        new = [values for values in dict.fromkeys(asked) if values not in self.candidates]
         base = study.configuration.controller
-        settings = [set_values(base, study.parameters, each) for each in new]
-        for each, score in zip(new, self.bench.score(settings, self.scenarios), strict=True):
-            self.candidates[each] = Candidate(each, score, self._violations(score))
-        return [self.candidates[each] for each in asked]
+        settings = [set_values(base, study.parameters, values) for values in new]
+        for values, score in zip(new, self.bench.score(settings, self.scenarios), strict=True):
+            self.candidates[values] = Candidate(values, score, self._violations(score))
+        return [self.candidates[values] for values in asked]
 
     def _violations(self, score: Score) -> tuple[float, ...]:
         goals = self.study.goals
-        # What is not a number without a trip is no better than one.
+        # A figure that is NaN without a trip counts as a trip.
         lost = score.trips or float(not all(map(math.isfinite, score.figures.values())))
         beyond = []
         for constraint, bound in zip(goals.constraints, self.bounds, strict=True):
+            # The baseline's figure sets the scale of a violation, also where the bound is 0.
             usual = abs(self.baseline.figures[constraint.measure.name])
             beyond.append(excess(constraint.measure, score, bound, usual))
         return lost, score.limits - goals.limits, *beyond
@@ -127,104 +131,139 @@ class Search:
         evaluations: int,
         within: tuple[Measure, float] | None = None,
     ) -> Candidate | None:
-        """Look for the best candidate allowed, from what an earlier search tried.
+        """Search for the best allowed candidate, starting from those already tried.
 
         Parameters
         ----------
         objective : Measure
-            What is to be made small, or large where more is better.
+            Measure to be minimised, or maximised if more of it is better.
         evaluations : int
-            Candidates to try, about.
+            Approximate number of candidates to try.
         within : (Measure, float), optional
-            One measure more that is held to a bound.
+            Additional measure and its bound.
 
         Returns
         -------
         Candidate or None
-            None if none is allowed.
+            Best candidate, or None if none is allowed.
         """
+        problem = _Problem(self, objective, within)
         count = len(self.study.parameters)
-        population = max(LEAST, min(max(FEWEST, PER_PARAMETER * count), evaluations))
+        generation = max(MIN_GENERATION, PER_PARAMETER * count)
+        population = max(SCIPY_MINIMUM, min(generation, evaluations))
+        # The number of candidates enters the seed, so that a second search of a front does not
+        # repeat the random numbers of the first.
         random = np.random.default_rng([self.seed, len(self.candidates)])
-
-        def violations(each: Candidate) -> list[float]:
-            if within is None:
-                return [*each.violations]
-            measure, bound = within
-            return [*each.violations, excess(measure, each.score, bound, abs(bound))]
-
-        def cost(each: Candidate) -> float:
-            figure = each.cost(objective)
-            return figure if math.isfinite(figure) else math.inf
-
-        def rate(shares: Array, of: Callable[[Candidate], Sequence[float]]) -> Array:
-            """Of shares (parameters, candidates), perhaps of none, or (parameters,) of one."""
-            rated = np.array([of(each) for each in self.score(np.atleast_2d(shares.T))])
-            return rated.T if shares.ndim > 1 else rated[0]
-
-        def costs(shares: Array) -> Array:
-            return rate(shares, lambda each: [cost(each)])[0] if shares.size else np.empty(0)
-
-        def order(each: Candidate) -> tuple[float, float]:
-            return max(0.0, *violations(each)), cost(each)
-
-        known = sorted(self.candidates.values(), key=order)[: population // 2]
-        start = [self._shares(each.values) for each in known] or [self._shares(self.start)]
+        # Half of the first generation are the best candidates so far; the rest fills the space.
+        best = sorted(self.candidates.values(), key=problem.order)[: population // 2]
+        start = [self._shares(candidate.values) for candidate in best]
+        start = start or [self._shares(self.start)]
         fresh = qmc.LatinHypercube(count, rng=random).random(population - len(start))
-        limit = NonlinearConstraint(lambda shares: rate(shares, violations), -math.inf, 0.0)
         differential_evolution(
-            costs,
+            problem.costs,
             [(0.0, 1.0)] * count,
-            constraints=limit,
+            constraints=NonlinearConstraint(problem.excesses, -math.inf, 0.0),
             init=np.vstack([start, fresh]),  # type: ignore[arg-type]
             maxiter=max(0, round(evaluations / population) - 1),
             tol=CONVERGED,
             rng=random,
             polish=False,
+            # Deferred updating scores a whole generation at a time, which workers share.
             updating="deferred",
             vectorized=True,
         )
-        allowed = [each for each in self.candidates.values() if max(violations(each)) <= 0.0]
-        return min(allowed, key=cost, default=None)
+        tried = self.candidates.values()
+        allowed = [candidate for candidate in tried if max(problem.violations(candidate)) <= 0.0]
+        return min(allowed, key=problem.cost, default=None)
 
     def _shares(self, values: Sequence[float]) -> list[float]:
         pairs = zip(self.study.parameters, values, strict=True)
         return [parameter.share(value) for parameter, value in pairs]
 
 
+class _Problem:
+    """Optimisation problem in the form that scipy's differential evolution takes.
+
+    Parameters
+    ----------
+    search
+        Search whose candidates are scored.
+    objective
+        Measure to be optimised.
+    within
+        Additional measure and its bound.
+    """
+
+    def __init__(
+        self, search: TuningSearch, objective: Measure, within: tuple[Measure, float] | None
+    ) -> None:
+        self._search, self._objective, self._within = search, objective, within
+
+    def violations(self, candidate: Candidate) -> list[float]:
+        """Return the relative violations of a candidate."""
+        if self._within is None:
+            return [*candidate.violations]
+        measure, bound = self._within
+        return [*candidate.violations, excess(measure, candidate.score, bound, abs(bound))]
+
+    def cost(self, candidate: Candidate) -> float:
+        """Return the objective of a candidate, infinite if it is missing."""
+        figure = candidate.cost(self._objective)
+        return figure if math.isfinite(figure) else math.inf
+
+    def order(self, candidate: Candidate) -> tuple[float, float]:
+        """Return a sort key: the worst violation first, then the cost."""
+        return max(0.0, *self.violations(candidate)), self.cost(candidate)
+
+    def costs(self, shares: Array) -> Array:
+        """Return the costs at shares of shape (parameters, candidates), or (parameters,)."""
+        return self._rate(shares, lambda c: [self.cost(c)])[0] if shares.size else np.empty(0)
+
+    def excesses(self, shares: Array) -> Array:
+        """Return the violations at shares of shape (parameters, candidates), or (parameters,)."""
+        return self._rate(shares, self.violations)
+
+    def _rate(self, shares: Array, rate: Callable[[Candidate], Sequence[float]]) -> Array:
+        # scipy passes a whole generation as columns, but sometimes a single vector, or none.
+        candidates = self._search.score(np.atleast_2d(shares.T))
+        rated = np.array([rate(candidate) for candidate in candidates])
+        return rated.T if shares.ndim > 1 else rated[0]
+
+
 def bound_of(constraint: Constraint, baseline: Score) -> float:
-    """A constraint's bound in the measure's unit.
+    """Return a constraint's bound in the measure's unit.
 
     Raises
     ------
     RigtwinError
-        If it is a share of what the baseline did not live to show, or of nothing.
+        If the bound is a share of a figure that the baseline lacks or that is not positive.
     """
     if math.isnan(constraint.share):
         return constraint.bound
     name = constraint.measure.name
-    there = baseline.figures[name]
-    if not math.isfinite(there):
+    figure = baseline.figures[name]
+    if not math.isfinite(figure):
         raise RigtwinError(f"{name} cannot be held to the baseline's: the baseline trips")
-    if constraint.share != 1.0 and there <= 0.0:
+    if constraint.share != 1.0 and figure <= 0.0:
         advice = "of which there is no share: give a number as its bound"
-        raise RigtwinError(f"{name} is {there:.4g} with the baseline, {advice}")
-    return constraint.share * there
+        raise RigtwinError(f"{name} is {figure:.4g} with the baseline, {advice}")
+    return constraint.share * figure
 
 
 def excess(measure: Measure, score: Score, bound: float, usual: float) -> float:
-    """By how much a measure violates its bound, relative; below 0 if it does not.
+    """Return the relative violation of a bound; negative if the bound is respected.
 
     Parameters
     ----------
     measure : Measure
-        What is bounded.
+        Measure with the bound.
     score : Score
-        What it came to.
+        Score of the candidate.
     bound : float
-        In the measure's unit.
+        Bound in the measure's unit.
     usual : float
-        Its size in the measure's unit: it is the share of this, or of the bound if that is larger.
+        Typical size in the measure's unit. The violation is relative to this or to the bound,
+        whichever is larger.
     """
     value = score.figures[measure.name]
     if not math.isfinite(value):
@@ -233,13 +272,13 @@ def excess(measure: Measure, score: Score, bound: float, usual: float) -> float:
     return beyond / max(abs(bound), usual if math.isfinite(usual) else 0.0, 1e-12)
 
 
-def find_best(search: Search) -> Candidate:
-    """Find the best candidate of a study with one objective.
+def find_best(search: TuningSearch) -> Candidate:
+    """Return the best candidate of a study with one objective.
 
     Raises
     ------
     RigtwinError
-        If no candidate is allowed, with what stands in the way; if the parameters do nothing.
+        If no candidate is allowed, or the parameters do not change the objective.
     """
     study = search.study
     best = _minimise(search, study.goals.minimise[0], study.budget.evaluations)
@@ -247,46 +286,49 @@ def find_best(search: Search) -> Candidate:
     return best
 
 
-def find_front(search: Search) -> tuple[Candidate, ...]:
-    """Find the candidates of a study with two objectives that none other beats in both.
+def find_front(search: TuningSearch) -> tuple[Candidate, ...]:
+    """Return the Pareto front of a study with two objectives.
 
-    Each objective alone at first, a third of the evaluations each; then the first with the second
-    held to bounds between.
+    Each objective is first minimised alone, with a third of the evaluations. The first objective is
+    then minimised with bounds on the second between its values at both ends (the ε-constraint
+    method).
 
     Returns
     -------
     tuple of Candidate
-        The best in the first objective first.
+        Candidates of the front, the best in the first objective first.
 
     Raises
     ------
     RigtwinError
-        As `find_best`.
+        If no candidate is allowed, or the parameters do not change the objectives.
     """
-    one, other = search.study.goals.minimise
+    first, second = search.study.goals.minimise
     budget, between = search.study.budget.evaluations // 3, search.study.budget.points - 2
-    ends = [_minimise(search, objective, budget) for objective in (one, other)]
-    low, high = (end.score.figures[other.name] for end in ends)
+    ends = [_minimise(search, objective, budget) for objective in (first, second)]
+    low, high = (end.score.figures[second.name] for end in ends)
     for bound in np.linspace(low, high, between + 2)[1:-1].tolist():
-        search.minimise(one, max(budget // between, 1), (other, bound))
+        search.minimise(first, max(budget // between, 1), (second, bound))
     _check_sensitivity(search)
     front: list[Candidate] = []
-    for each in sorted(search.allowed, key=lambda each: (each.cost(one), each.cost(other))):
-        if not front or each.cost(other) < front[-1].cost(other):
-            front.append(each)
+    # In the order of the first objective, a candidate is on the front if it improves the second.
+    for candidate in sorted(search.allowed, key=lambda c: (c.cost(first), c.cost(second))):
+        if not front or candidate.cost(second) < front[-1].cost(second):
+            front.append(candidate)
     return tuple(front)
 
 
-def _minimise(search: Search, objective: Measure, evaluations: int) -> Candidate:
-    """The best candidate allowed. Raises RigtwinError if there is none."""
+def _minimise(search: TuningSearch, objective: Measure, evaluations: int) -> Candidate:
+    """Return the best allowed candidate. Raise RigtwinError if there is none."""
     best = search.minimise(objective, evaluations)
     if best is not None:
         return best
     goals = search.study.goals
-    names = ["trips", "limits", *(each.measure.name for each in goals.constraints)]
+    names = ["trips", "limits", *(constraint.measure.name for constraint in goals.constraints)]
+    # The message names what the best candidate fails at, which shows the user what to relax.
     nearest = min(
         search.candidates.values(),
-        key=lambda each: sum(max(0.0, violation) for violation in each.violations),
+        key=lambda candidate: sum(max(0.0, violation) for violation in candidate.violations),
     )
     pairs = zip(names, nearest.violations, strict=True)
     missed = " and ".join(name for name, violation in pairs if violation > 0.0)
@@ -294,10 +336,13 @@ def _minimise(search: Search, objective: Measure, evaluations: int) -> Candidate
     raise RigtwinError(f"{count}; the nearest fails at {missed}: allow more, or wider bounds")
 
 
-def _check_sensitivity(search: Search) -> None:
-    """Raises RigtwinError if the parameters make no difference to any objective."""
+def _check_sensitivity(search: TuningSearch) -> None:
+    """Raise RigtwinError if the parameters do not change any objective."""
     study, allowed = search.study, search.allowed
-    differ = [len({each.cost(one) for each in allowed}) > 1 for one in study.goals.minimise]
+    differ = [
+        len({candidate.cost(objective) for candidate in allowed}) > 1
+        for objective in study.goals.minimise
+    ]
     if len(allowed) > 1 and not any(differ):
         names = " and ".join(parameter.key for parameter in study.parameters)
         advice = "is what they belong to switched on?"

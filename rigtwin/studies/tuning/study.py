@@ -1,4 +1,4 @@
-"""What to tune, for what, and under which circumstances."""
+"""Definition of a tuning study: parameters, goals, budget, and variation of the rig."""
 
 from __future__ import annotations
 
@@ -12,24 +12,24 @@ from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Machine
 from rigtwin.simulation.experiment import Experiment
 from rigtwin.studies.tuning.measures import Measure
-from rigtwin.studies.tuning.parameter import Parameter
+from rigtwin.studies.tuning.parameter import TuningParameter
 
 Changes = Mapping[str, Mapping[str, object]]
-"""Group → name → value."""
+"""Group → name → value of changed settings."""
 
 
 @dataclass(frozen=True)
 class Constraint:
-    """No more of a measure than a bound; of one of which more is better, no less.
+    """Upper bound on a measure; a lower bound if more of it is better.
 
     Parameters
     ----------
     measure : Measure
-        What is bounded.
+        Measure with the bound.
     bound : float
-        In the measure's unit; not a number if `share` says it.
+        Bound in the measure's unit; NaN if `share` defines it.
     share : float, optional
-        The bound as a share of what the baseline has.
+        Bound as a share of the baseline's figure.
     """
 
     measure: Measure
@@ -39,18 +39,18 @@ class Constraint:
 
 @dataclass(frozen=True)
 class Goals:
-    """What the settings are tuned for.
+    """Goals of a study.
 
     Parameters
     ----------
     minimise : tuple of Measure
-        One objective, or two whose front is looked for.
+        One objective, or two whose Pareto front is computed.
     constraints : tuple of Constraint
-        What the settings are held to besides.
+        Constraints on other measures.
     limits : float
         Share of any safety limit that no run may exceed.
     report : tuple of Measure, optional
-        Measures that are told besides.
+        Further measures that are reported.
     """
 
     minimise: tuple[Measure, ...]
@@ -60,25 +60,25 @@ class Goals:
 
     @property
     def measures(self) -> tuple[Measure, ...]:
-        """All that a run is measured by, the objectives first."""
-        constrained = (each.measure for each in self.constraints)
+        """All measures of a run, the objectives first, without repetition."""
+        constrained = (constraint.measure for constraint in self.constraints)
         return tuple(dict.fromkeys((*self.minimise, *constrained, *self.report)))
 
 
 @dataclass(frozen=True)
 class Budget:
-    """How much is run.
+    """Numbers of runs.
 
     Parameters
     ----------
     roads : int
-        Scenarios of the search.
+        Number of scenarios of the search.
     held_out : int
-        Scenarios of the evaluation.
+        Number of scenarios of the evaluation.
     evaluations : int
-        Candidates that the search may try, about.
+        Approximate number of candidates the search may try.
     points : int
-        Of a front that are evaluated, at most.
+        Maximum number of points of a front that are evaluated.
     """
 
     roads: int
@@ -89,14 +89,14 @@ class Budget:
 
 @dataclass(frozen=True)
 class Variation:
-    """How a rig differs from scenario to scenario, uniformly about its values.
+    """Variation of the rig between scenarios, uniform about its values.
 
     Parameters
     ----------
     tolerances : float
-        Half widths of the machine's tolerances.
+        Half width of the variation, in half widths of the machine's tolerances.
     shares : mapping
-        `component.parameter` → share of its value.
+        `component.parameter` → half width as a share of its value.
     """
 
     tolerances: float = 0.0
@@ -105,36 +105,36 @@ class Variation:
 
 @dataclass(frozen=True)
 class Study:
-    """What to tune, for what, and under which circumstances.
+    """Tuning study: what is tuned, for which goals, and under which circumstances.
 
     Parameters
     ----------
     name, title : str
-        What it is called, and what it is in words.
+        Name, and title in words.
     machine : Machine
-        Whose twin is run.
+        Machine whose twin is simulated.
     experiment : Experiment
-        The test that is run.
+        Experiment that is simulated.
     configuration : Configuration
-        Of every run.
+        Configuration of every run.
     search_changes : mapping
-        What the search runs differently.
+        Settings that differ in the search's runs.
     baseline_changes : mapping
-        What the settings that are compared with have differently.
+        Settings that differ in the baseline.
     parameters : tuple of Parameter
-        What is tuned.
+        Tuning parameters.
     goals : Goals
-        What it is tuned for.
+        Goals of the tuning.
     budget : Budget
-        How much is run.
+        Numbers of runs.
     first : float
-        s, from which on a run is measured.
+        Time at which measuring begins, in s.
     quantile : float
-        Of a measure over scenarios: what settings are scored by.
+        Quantile of a measure over scenarios that settings are scored by.
     variation : Variation, optional
-        How the rig differs from scenario to scenario.
+        Variation of the rig between scenarios.
     other_rigs : mapping, optional
-        Name → changes of the rig to evaluate on besides.
+        Name → changes of further rigs to evaluate on.
     """
 
     name: str
@@ -144,7 +144,7 @@ class Study:
     configuration: Configuration
     search_changes: Changes
     baseline_changes: Changes
-    parameters: tuple[Parameter, ...]
+    parameters: tuple[TuningParameter, ...]
     goals: Goals
     budget: Budget
     first: float
@@ -154,10 +154,11 @@ class Study:
 
     @property
     def baseline_settings(self) -> Any:
-        """The settings of the controller that is compared with, a NamedTuple."""
+        """Settings of the baseline controller, a NamedTuple."""
         return override(self.configuration, self.baseline_changes).controller
 
     @property
     def search_configuration(self) -> Configuration:
-        """What a search runs: perhaps shorter or coarser than what is evaluated."""
+        """Configuration of the search's runs, which may be shorter or coarser than evaluation."""
+
         return override(self.configuration, self.search_changes)

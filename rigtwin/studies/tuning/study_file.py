@@ -1,6 +1,6 @@
-"""Reads a study from its TOML file.
+"""Reader of studies in TOML files.
 
-Every mistake is one line that names the entry and what was expected.
+Every error message is one line that names the entry and what was expected.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from rigtwin.errors import RigtwinError
 from rigtwin.simulation.experiment import find_experiment
 from rigtwin.studies.tuning.measures import Measure
 from rigtwin.studies.tuning.own_measures import list_channels, parse_measure
-from rigtwin.studies.tuning.parameter import Parameter
+from rigtwin.studies.tuning.parameter import TuningParameter
 from rigtwin.studies.tuning.study import Budget, Changes, Constraint, Goals, Study, Variation
 
 BASELINE = "baseline"
@@ -42,9 +42,9 @@ KEYS = (
     *("judge", "measures"),
 )
 MOST = 10_000
-"""Scenarios. Fewer than six have no 95 % interval of their median."""
+"""Maximum number of scenarios. Fewer than six have no 95 % interval of their median."""
 LONGEST = 100
-"""Characters of a title or a name, which stand in tables and pictures."""
+"""Maximum number of characters of a title or name, which appear in tables and pictures."""
 
 
 def read_study(
@@ -53,42 +53,45 @@ def read_study(
     assignments: Sequence[str] = (),
     **numbers: int | None,
 ) -> Study:
-    """Read a study.
+    """Read a study from its file.
 
     Parameters
     ----------
     path : Path
-        Its file.
+        Path of the file.
     machine : Machine, optional
-        Whose controller is tuned; by default that which the study names, or else the suspension
-        rig.
+        Machine whose controller is tuned. Defaults to the one the study names, or else to the
+        suspension rig.
     assignments : sequence of str, optional
-        `group.name=value` for every run, over the study's own.
+        Settings `group.name=value` of every run, which override the study's.
     **numbers : int or None
-        Of roads, held_out, evaluations; None for the study's own.
+        Values of `roads`, `held_out` and `evaluations`; None for the study's.
 
     Raises
     ------
     RigtwinError
-        Naming the entry and what was expected, and the file if it is wrong there.
+        If an entry is wrong; the message names it, what was expected, and the file.
     """
-    given: dict[str, dict[str, object]] = {}
-    for own in parse_assignments(assignments):
-        for group, values in own.items():
-            given.setdefault(group, {}).update(values)
-    other = {key: number for key, number in numbers.items() if number is not None}
+    overrides: dict[str, dict[str, object]] = {}
+    for assignment in parse_assignments(assignments):
+        for group, values in assignment.items():
+            overrides.setdefault(group, {}).update(values)
+    changed = {key: number for key, number in numbers.items() if number is not None}
 
     def parse(tables: Mapping[str, Any]) -> tuple[Mapping[str, Any], Machine, Study]:
-        of = _machine(path, tables) if machine is None else machine
-        return tables, of, parse_study(path.stem, tables, of)
+        tuned = _machine(path, tables) if machine is None else machine
+        return tables, tuned, parse_study(path.stem, tables, tuned)
 
-    tables, of, own = read_toml(path, parse)
-    # What is wrong from here on is not wrong in the file.
-    return parse_study(path.stem, {**tables, **other}, of, given) if other or given else own
+    # The file is parsed without the overrides first, so that read_toml blames the file only for
+    # its own mistakes.
+    tables, tuned, study = read_toml(path, parse)
+    if not (changed or overrides):
+        return study
+    return parse_study(path.stem, {**tables, **changed}, tuned, overrides)
 
 
 def _machine(path: Path, tables: Mapping[str, Any]) -> Machine:
-    """The machine that a study names: one that is shipped, or a description beside the study."""
+    """Return the machine a study names: a shipped one, or a description beside the study."""
     name = _text("machine", tables.get("machine", DEFAULT_MACHINE))
     beside = path.parent / name
     return find(str(beside) if name.endswith(".toml") and beside.is_file() else name)
@@ -98,40 +101,34 @@ def parse_study(
     name: str,
     tables: Mapping[str, Any],
     machine: Machine,
-    given: Changes | None = None,
+    overrides: Changes | None = None,
 ) -> Study:
-    """Make a study of its TOML tables.
+    """Return the study described by TOML tables.
 
     Parameters
     ----------
     name : str
-        What it is called.
+        Name of the study.
     tables : mapping
-        As they stand in its file.
+        Tables of the file.
     machine : Machine
-        Whose controller is tuned.
-    given : mapping, optional
-        Group → name → value for every run, over what the tables have.
+        Machine whose controller is tuned.
+    overrides : mapping, optional
+        Group → name → value of every run, which overrides the tables.
 
     Raises
     ------
     RigtwinError
-        Naming the entry and what was expected.
+        If an entry is wrong; the message names it and what was expected.
     """
-    for key in tables:
-        if key not in KEYS:
-            raise RigtwinError(f"unknown {key!r}; there are {', '.join(KEYS)}")
-    for key in REQUIRED:
-        if key not in tables:
-            raise RigtwinError(f"{key} is missing")
-    if not len(machine.configuration.controller):
-        expected = "expected a machine with a [controller] that has settings"
-        raise RigtwinError(f"{machine.name} has nothing to tune; {expected}")
+    _check_keys(tables, machine)
     experiment = find_experiment(machine, _text("experiment", tables["experiment"]))
-    given, base = given or {}, experiment.configuration
-    configuration = override(override(base, _changes("set", tables.get("set", {}), base)), given)
-    search = _search(tables.get("search", {}), given, base)
+    overrides, base = overrides or {}, experiment.configuration
+    changes = _changes("set", tables.get("set", {}), base)
+    configuration = override(override(base, changes), overrides)
+    search = _search(tables.get("search", {}), overrides, base)
     shorter = override(configuration, search)
+    # These properties raise an error if the timing is inconsistent.
     _ = shorter.ticks, shorter.substeps
     first = _number("from", tables.get("from", 0.0), 0.0, 86_400.0)
     shortest = min(configuration.timing.duration, shorter.timing.duration)
@@ -161,14 +158,27 @@ def parse_study(
     )
 
 
+def _check_keys(tables: Mapping[str, Any], machine: Machine) -> None:
+    """Raise RigtwinError unless all keys are known, and none that is required is missing."""
+    for key in tables:
+        if key not in KEYS:
+            raise RigtwinError(f"unknown {key!r}; expected {', '.join(KEYS)}")
+    for key in REQUIRED:
+        if key not in tables:
+            raise RigtwinError(f"{key} is missing")
+    if not len(machine.configuration.controller):
+        expected = "expected a machine with a [controller] that has settings"
+        raise RigtwinError(f"{machine.name} has nothing to tune; {expected}")
+
+
 def _known_measures(machine: Machine, table: object) -> dict[str, Measure]:
-    """By name: the rig's, and those that the study defines."""
+    """Return the rig's measures and those that the study defines, by name."""
     known = machine.physics.measures()
     channels = list_channels(machine)
-    for name, own in _table("measures", table, "tables, [measures.NAME]").items():
+    for name, entry in _table("measures", table, "tables, [measures.NAME]").items():
         if name in known:
-            raise RigtwinError(f"measures.{name}: there is a measure of that name already")
-        known[name] = parse_measure(_text("measures", name), own, channels)
+            raise RigtwinError(f"measures.{name}: the name of a built-in measure; expected another")
+        known[name] = parse_measure(_text("measures", name), entry, channels)
     return known
 
 
@@ -198,27 +208,30 @@ def _table(where: str, table: object, expected: str) -> Mapping[str, Any]:
 
 
 def _changes(where: str, table: object, base: Configuration) -> dict[str, dict[str, object]]:
-    """`"group.name" = value` entries, or tables of them; every key and value is checked."""
-    found: dict[str, dict[str, object]] = {}
+    """Return changes by group and name, from `"group.name" = value` entries or from tables.
+
+    Every name and value is checked against the base configuration.
+    """
+    changes: dict[str, dict[str, object]] = {}
     expected = 'a table of settings, such as "controller.kp" = 0.5'
     for key, value in _table(where, table, expected).items():
         group, dot, name = key.partition(".")
         if isinstance(value, Mapping) and not dot:
-            found.setdefault(key, {}).update(value)
+            changes.setdefault(key, {}).update(value)
         elif dot and name:
-            found.setdefault(group, {})[name] = value
+            changes.setdefault(group, {})[name] = value
         else:
             expected = 'expected group.name, such as "controller.kp" = 0.5'
             raise RigtwinError(f"{where}: {key} = {value!r}: {expected}")
     try:
-        override(base, found)
+        override(base, changes)
     except RigtwinError as error:
         raise RigtwinError(f"{where}: {error}") from None
-    return found
+    return changes
 
 
 def _only(where: str, changes: Changes, allowed: Sequence[str], expected: str) -> None:
-    """Raises RigtwinError for a group that is not among those allowed."""
+    """Raise RigtwinError for a group that is not among the allowed ones."""
     for group in changes:
         if group not in allowed:
             raise RigtwinError(f"{where}: {group}: expected {expected}")
@@ -230,30 +243,30 @@ def _baseline(table: object, base: Configuration) -> Changes:
     return changes
 
 
-def _search(table: object, given: Changes, base: Configuration) -> Changes:
-    """What the search runs differently, less what is given at once, which goes for it too."""
+def _search(table: object, overrides: Changes, base: Configuration) -> Changes:
+    """Return the changes of the search's runs, without settings that the user overrides."""
     changes = _changes("search", table, base)
     _only("search", changes, ["timing", "safety", "road"], "timing, safety or road")
-    found = {}
-    for group, own in changes.items():
-        fixed = given.get(group, {})
-        found[group] = {key: value for key, value in own.items() if key not in fixed}
-    return found
+    remaining = {}
+    for group, settings in changes.items():
+        fixed = overrides.get(group, {})
+        remaining[group] = {key: value for key, value in settings.items() if key not in fixed}
+    return remaining
 
 
 def _measures(key: str, names: object, known: Mapping[str, Measure]) -> tuple[Measure, ...]:
-    listed, there = [names] if isinstance(names, str) else names, ", ".join(known) or "none"
+    listed, available = [names] if isinstance(names, str) else names, ", ".join(known) or "none"
     if not isinstance(listed, list) or not all(isinstance(name, str) for name in listed):
-        raise RigtwinError(f"{key} = {names!r}: expected names of {there}")
+        raise RigtwinError(f"{key} = {names!r}: expected names of {available}")
     for name in listed:
         if name not in known:
             more = "; [measures.NAME] defines one"
-            raise RigtwinError(f"{key}: unknown {name!r}; there are {there}{more}")
+            raise RigtwinError(f"{key}: unknown {name!r}; expected {available}{more}")
     return tuple(known[name] for name in dict.fromkeys(listed))
 
 
 def _quantity(key: str, configuration: Configuration) -> Quantity:
-    """The meaning of a setting that is a number. Raises RigtwinError for any other."""
+    """Return the unit and bounds of a numeric setting. Raise RigtwinError for any other."""
     group, _, name = key.partition(".")
     known = groups(configuration)
     meaning = fields(type(known[group])).get(name) if group in known else None
@@ -263,7 +276,7 @@ def _quantity(key: str, configuration: Configuration) -> Quantity:
     return meaning
 
 
-def _parameters(table: object, configuration: Configuration) -> tuple[Parameter, ...]:
+def _parameters(table: object, configuration: Configuration) -> tuple[TuningParameter, ...]:
     expected = 'settings with bounds, such as "controller.kp" = [0.1, 2.0]'
     entries = _table("parameters", table, expected)
     if not entries:
@@ -271,16 +284,17 @@ def _parameters(table: object, configuration: Configuration) -> tuple[Parameter,
     return tuple(_parameter(key, entry, configuration) for key, entry in entries.items())
 
 
-def _parameter(key: str, entry: object, configuration: Configuration) -> Parameter:
+def _parameter(key: str, entry: object, configuration: Configuration) -> TuningParameter:
     where = f"parameters: {key}"
+    # The plant is the rig as it is; only what the engineer can set is tuned.
     if not key.startswith("controller."):
         raise RigtwinError(f"{where}: only the controller is tuned; expected controller.name")
     meaning = _quantity(key, configuration)
-    own = entry if isinstance(entry, Mapping) else {"between": entry}
-    bounds, scale = own.get("between"), own.get("scale", "linear")
-    if set(own) - {"between", "scale"} or scale not in ("linear", "logarithmic"):
+    table = entry if isinstance(entry, Mapping) else {"between": entry}
+    bounds, scale = table.get("between"), table.get("scale", "linear")
+    if set(table) - {"between", "scale"} or scale not in ("linear", "logarithmic"):
         expected = 'expected between = [low, high], scale = "logarithmic"'
-        raise RigtwinError(f"{where} = {dict(own)}: {expected}")
+        raise RigtwinError(f"{where} = {dict(table)}: {expected}")
     if not isinstance(bounds, list) or len(bounds) != 2:
         raise RigtwinError(f"{where} = {bounds!r}: expected its bounds, [low, high]")
     low, high = (_number(where, bound, meaning.low, meaning.high) for bound in bounds)
@@ -288,14 +302,14 @@ def _parameter(key: str, entry: object, configuration: Configuration) -> Paramet
     if not low < high or (logarithmic and low <= 0.0):
         expected = "expected low below high, above 0 if logarithmic"
         raise RigtwinError(f"{where} = [{low:g}, {high:g}]: {expected}")
-    return Parameter(key, low, high, logarithmic, meaning.unit)
+    return TuningParameter(key, low, high, logarithmic, meaning.unit)
 
 
 def _goals(tables: Mapping[str, Any], known: Mapping[str, Measure]) -> Goals:
     asked = tables["minimise"]
     minimise = _measures("minimise", asked, known)
     if len(minimise) not in (1, 2) or (isinstance(asked, list) and len(minimise) != len(asked)):
-        expected = "expected one objective, or two others for their front"
+        expected = "expected one objective, or two different ones for their front"
         raise RigtwinError(f"minimise = {asked!r}: {expected}")
     expected = f'measures with bounds, such as road_holding = "{BASELINE}"'
     bounds = dict(_table("constraints", tables.get("constraints", {}), expected))
@@ -309,6 +323,7 @@ def _constraint(key: str, value: object, known: Mapping[str, Measure]) -> Constr
     where, (measure,) = f"constraints: {key}", _measures("constraints", [key], known)
     if not isinstance(value, str):
         return Constraint(measure, _number(where, value, -1e12, 1e12))
+    # "baseline" alone, or a share of it such as "0.98 baseline".
     share, _, word = value.rpartition(" ")
     try:
         factor = float(share or 1.0)
@@ -325,23 +340,25 @@ def _variation(table: object, configuration: Configuration) -> Variation:
     tolerances = _number("vary: tolerances", shares.pop("tolerances", 0.0), 0.0, 10.0)
     for key, value in shares.items():
         where = f"vary: {key}"
+        # Only the machine varies between scenarios; the controller's settings are the study's to
+        # choose.
         if key.partition(".")[0] not in configuration.plant._fields:
             expected = "expected component.parameter of the machine, or tolerances"
             raise RigtwinError(f"{where}: {expected}")
         _quantity(key, configuration)
         if value_of(configuration, key) == 0.0:
-            advice = "any share of that is nothing; give it a value in [set]"
+            advice = "any share of 0 is 0; give it a value in [set]"
             raise RigtwinError(f"{where}: it is 0 in this machine, and {advice}")
         shares[key] = _number(where, value, 0.0, 1.0)
     return Variation(tolerances, shares)
 
 
 def _other_rigs(table: object, configuration: Configuration) -> dict[str, Changes]:
-    found: dict[str, Changes] = {}
+    rigs_changes: dict[str, Changes] = {}
     rigs = _table("judge", table, "tables of changes of the rig, [judge.NAME]")
     for name, changes in rigs.items():
         where = f"judge: {_text('judge', name)}"
-        found[name] = _changes(where, changes, configuration)
+        rigs_changes[name] = _changes(where, changes, configuration)
         expected = 'changes of the machine alone, such as "motor.coulomb" = 18.2'
-        _only(where, found[name], configuration.plant._fields, expected)
-    return found
+        _only(where, rigs_changes[name], configuration.plant._fields, expected)
+    return rigs_changes

@@ -14,7 +14,7 @@ from controllers.mil import controller, initial_state, update
 from controllers.settings import PlateCompensator
 from rigtwin.description.configuration import Configuration
 from rigtwin.errors import RigtwinError
-from rigtwin.hardware.session.own_controller import own_controller
+from rigtwin.hardware.session.custom_controller import custom_controller
 from rigtwin.hardware.session.permission import key_of
 
 SHORT = {"timing": {"duration": 2.0}, "safety": {"ramp": 0.3, "hold": 0.1}}
@@ -55,10 +55,10 @@ def on_card(path: Path, **options: Any) -> rigtwin.Recording:
 
 def test_one_s_own_that_is_the_rig_s_commands_the_same(tmp_path: Path) -> None:
     plain = on_twin(tmp_path / "plain.mcap")
-    own = on_twin(tmp_path / "own.mcap", controller=Same)
+    recorded = on_twin(tmp_path / "own.mcap", controller=Same)
     for channel in plain.channels:
-        assert np.array_equal(own[channel], plain[channel])
-    assert set(own.controller) == {"own", "start", "preload"}
+        assert np.array_equal(recorded[channel], plain[channel])
+    assert set(recorded.controller) == {"own", "start", "preload"}
 
 
 def test_a_compensator_commands_on_the_card_what_it_does_on_the_twin(tmp_path: Path) -> None:
@@ -80,7 +80,7 @@ def test_what_it_gives_is_looked_at(tmp_path: Path) -> None:
     assert not ended.completed
     assert "the controller failed" in ended.cause
     with pytest.raises(RigtwinError, match="expected a function of the configuration"):
-        own_controller(3)  # type: ignore[arg-type]
+        custom_controller(3)  # type: ignore[arg-type]
 
 
 def test_a_dry_run_holds_for_one_controller_alone() -> None:

@@ -1,8 +1,8 @@
-"""Compiled code as it lies on the disk: whole, or not used.
+"""Cache of compiled code that verifies every file before use.
 
-numba believes whatever stands in its cache. A full disk, a pulled plug or a bad sector leave files
-there that are cut, empty or garbled, and machine code that is garbled does anything. So each file
-ends with a digest of what stands before it.
+numba trusts whatever is in its cache. A full disk, a power failure or a bad sector leaves files
+that are truncated, empty or corrupt, and corrupt machine code may do anything. Each file therefore
+ends with a digest of its content.
 """
 
 from __future__ import annotations
@@ -22,16 +22,17 @@ from numba.core.caching import FunctionCache, IndexDataCacheFile
 _DIGEST = hashlib.sha256().digest_size
 
 
-class KeptCode(FunctionCache):
-    """numba's cache of one function. Where it cannot be written, the code is not kept, and the log
-    says so."""
+class VerifiedCache(FunctionCache):
+    """numba's cache of one function. If it cannot be written, the code is compiled every time, and
+    the log says so."""
 
     def __init__(self, function: Any) -> None:
         super().__init__(function)
-        of = self._cache_file
-        self._cache_file: _WholeFiles = _WholeFiles.like(of)
+        files = self._cache_file
+        self._cache_file: _VerifiedFiles = _VerifiedFiles.like(files)
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Load compiled code; None if it cannot be read."""
         try:
             return super().load_overload(sig, target_context)
         except OSError as error:
@@ -39,6 +40,7 @@ class KeptCode(FunctionCache):
             return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
+        """Save compiled code, if possible."""
         try:
             super().save_overload(sig, data)
         except OSError as error:
@@ -52,23 +54,24 @@ class KeptCode(FunctionCache):
         )
 
 
-class _WholeFiles(IndexDataCacheFile):
-    """The files of one function, an index and one for each signature."""
+class _VerifiedFiles(IndexDataCacheFile):
+    """Files of one function: an index, and one file per signature."""
 
     @classmethod
-    def like(cls, other: IndexDataCacheFile) -> _WholeFiles:
+    def like(cls, files: IndexDataCacheFile) -> _VerifiedFiles:
+        """Return verified files at the place of plain ones."""
         made = cls.__new__(cls)
-        made.__dict__.update(other.__dict__)
+        made.__dict__.update(files.__dict__)
         return made
 
     def _load_index(self) -> Any:
         path = Path(self._index_path)
         if path.exists() and not _is_whole(path):
-            # What the index said of the others is lost with it.
+            # Without the index nobody knows what the other files contain, so they go too.
             stem = path.name.removesuffix(".nbi")
-            for each in [path, *path.parent.glob("*.nbc")]:
-                if each.name.startswith(f"{stem}."):
-                    each.unlink(missing_ok=True)
+            for file in [path, *path.parent.glob("*.nbc")]:
+                if file.name.startswith(f"{stem}."):
+                    file.unlink(missing_ok=True)
         return super()._load_index()
 
     def _load_data(self, name: str) -> Any:
@@ -79,6 +82,7 @@ class _WholeFiles(IndexDataCacheFile):
 
     @contextmanager
     def _open_for_write(self, filepath: str) -> Iterator[Any]:
+        # The file is complete on disk before it takes its name; a power failure leaves the old one.
         content = BytesIO()
         yield content
         data = content.getvalue()
@@ -96,5 +100,7 @@ class _WholeFiles(IndexDataCacheFile):
 
 
 def _is_whole(path: Path) -> bool:
+    """Return whether a file's digest matches its content."""
+
     data = path.read_bytes()
     return hashlib.sha256(data[:-_DIGEST]).digest() == data[-_DIGEST:]

@@ -8,7 +8,7 @@ import numba
 import pytest
 from numba.core import config
 
-from rigtwin.numerics.kept_code import KeptCode
+from rigtwin.numerics.verified_cache import VerifiedCache
 
 
 def triple(x: float) -> float:
@@ -19,7 +19,7 @@ def compiled(folder: Path, monkeypatch) -> float:
     """What the function gives, compiled or loaded as a new process would."""
     monkeypatch.setattr(config, "CACHE_DIR", str(folder))
     made = numba.njit(nogil=True)(triple)
-    made._cache = KeptCode(triple)
+    made._cache = VerifiedCache(triple)
     return made(2.0)
 
 
