@@ -281,6 +281,7 @@ FUNCTIONS = {
     "calibrate": ("calibrate",),
     "compare": ("compare", "compare_recordings"),
     "diagnose": ("diagnose", "Diagnosis.report"),
+    "fit": ("fit", "EffectFit.save_mjcf"),
     "look": ("look", "show_look"),
     "machines": ("machines",),
     "machine": ("machine",),
@@ -354,7 +355,7 @@ def test_a_setting_that_a_comparison_does_not_use_is_refused_at_its_default_too(
     at = tmp_path / "r.mcap"
     recording = rigtwin.run("suspension-rig", "imposed", path=at, settings=settings)
     for several in (rigtwin.compare, rigtwin.diagnose):
-        with pytest.raises(rigtwin.RigtwinError, match=r"controller.preload: a comparison changes"):
+        with pytest.raises(rigtwin.RigtwinError, match=r"controller.preload: .* states"):
             several(recording, settings={"controller": {"preload": own}})
     file = tmp_path / "all.toml"
     file.write_text(f"[controller]\npreload = {own}\n[rail]\ncoulomb = 50.0\n")

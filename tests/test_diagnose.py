@@ -104,7 +104,9 @@ def test_a_friction_taken_out_of_the_twin_is_found():
 
 
 def test_what_is_not_there_cannot_be_taken_out():
-    with pytest.raises(RigtwinError, match=r"none to take out; it has coulomb@rail, coulomb@motor"):
+    with pytest.raises(
+        RigtwinError, match=r"the twin has none of it; it has coulomb@rail, coulomb@motor"
+    ):
         without_effect(Configuration(), "viscous@rail")
     with pytest.raises(RigtwinError, match="unknown effect"):
         without_effect(Configuration(), "nonsense@rail")
@@ -487,7 +489,7 @@ def test_the_command_writes_what_it_says(tmp_path, capsys):
         (["{rig}", "--json", "{rig}"], "is the input"),
         (["{rig}", "--html", "{folder}/none/r.html"], "folder does not exist"),
         (["{rig}", "--set", "controller.kp=1"], "recording's own"),
-        (["{rig}", "--without", "viscous@rail"], "none to take out"),
+        (["{rig}", "--without", "viscous@rail"], "cannot take out viscous@rail"),
         (["{folder}/none.mcap"], "none.mcap"),
     ],
 )

@@ -73,7 +73,7 @@ def test_effects_that_the_time_does_not_suffice_for_are_neither_seen_nor_unseen(
     machine = rigtwin.machine("damper-bench")
     stages: list[str] = []
     can = rigtwin.identifiability(machine, seconds=0.0, progress=stages.append)
-    assert (can.seen, can.unseen, can.alike) == ((), (), {})
+    assert (can.seen, can.unseen, can.confounded) == ((), (), {})
     assert set(can.untried) == {e.name for e in rigtwin.effects(machine) if e.searched}
     assert stages[0] == "made-up motions"
 

@@ -157,7 +157,10 @@ def test_another_setting_is_another_session(tmp_path):
     ("arguments", "said"),
     [
         (["--target", "daq"], "needs the card's channel table"),
-        (["--target", "daq", "--card", "nowhere.toml"], "cannot read nowhere.toml"),
+        (
+            ["--target", "daq", "--card", "nowhere.toml"],
+            "channel table nowhere.toml does not exist",
+        ),
         (["--dry-run"], "--dry-run goes with --target daq"),
         (["--arm"], "--arm goes with --target daq"),
         (["--live"], "--live goes with --card or --real-time"),
@@ -589,7 +592,7 @@ def test_a_list_is_run_on_the_twin_of_any_machine(tmp_path, capsys):
     assert main([*session, "--resume"]) == 0
     assert "2 of 2 tests are done already" in capsys.readouterr().out
     for option, said in (
-        (["--card", "card.toml"], "cannot read card.toml"),
+        (["--card", "card.toml"], "channel table card.toml does not exist"),
         (["--target", "daq"], "--target daq needs the card's channel table"),
         (["--real-time"], "--real-time of bench needs a channel table of it"),
         (["--dry-run"], "--dry-run, --without-dry-run and --arm go with --target daq"),

@@ -253,6 +253,8 @@ def _given(data: Any) -> Any:
         return [Path(data)]
     if isinstance(data, list | tuple) and data and all(isinstance(n, str | Path) for n in data):
         return [Path(name) for name in data]
+    if isinstance(data, bool | int | float) or data is None:
+        raise RigtwinError(f"data {data!r}: expected the path of a file, or a table in memory")
     return data
 
 

@@ -89,7 +89,7 @@ def test_a_plant_with_another_value_keeps_all_others():
     ("name", "says"),
     [
         ("coulomb@tyre", "unknown effect 'coulomb' at tyre; there are"),
-        ("coulomb@axle", "unknown effect 'coulomb@axle'; expected KIND@COMPONENT"),
+        ("coulomb@axle", "unknown effect 'coulomb@axle'; did you mean"),
     ],
 )
 def test_an_unknown_effect_is_refused_with_what_there_is(name, says):
