@@ -608,11 +608,8 @@ def test_a_column_of_other_numbers_is_said_with_its_cell(tmp_path: Path, cell: s
     lines = [line.rsplit(",", 1)[0] + f",{cell}" for line in text().splitlines()[1:]]
     with pytest.raises(RigtwinError) as caught:
         imported(tmp_path, "\n".join(["t,x,f", *lines]))
-    said = str(caught.value)
-    assert (
-        f"column 'f' cannot be read: it holds {cell.strip(chr(34))!r} in line 2, which was taken for"
-        in said
-    )
+    said, shown = str(caught.value), cell.strip('"')
+    assert f"column 'f' cannot be read: it holds {shown!r} in line 2, which was taken for" in said
     assert "no column" not in said
 
 

@@ -209,8 +209,11 @@ class Machine:
         return self.form if self.form is not None else FORM[row.kind]
 
     def effects(self) -> Iterator[Effect]:
-        """All effects that this machine can have. A computer's delay is only told from an
-        actuator's where there are several, and is none where no controller is described."""
+        """Yield all effects that this machine can have.
+
+        The delay that all commands share (`delay@controller`) differs from an actuator's own only
+        where there are several actuators.
+        """
         movers = {
             mover
             for replay in self.replays
@@ -218,7 +221,7 @@ class Machine:
             if (channel := self.components[mover].channel) and channel[0] == "/command"
         }
         for effect in candidates(self.plant):
-            if effect.group == "computer" and (len(movers) < 2 or self.control is None):
+            if effect.group == "computer" and len(movers) < 2:
                 continue
             if effect.name in self.excluded:
                 continue

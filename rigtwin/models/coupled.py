@@ -156,7 +156,7 @@ class CoupledModel(Model[Plant]):
         exact = self.predict(plant)
         swing = np.std(exact, axis=1)
         quick = self._start.fitted and self._start.linear
-        for every, steps in self._list_grids(COARSER * longest):
+        for every, steps in self._list_grids(longest):
             if (every, steps, quick) == (1, self._steps, False):
                 break
             coarser = CoupledModel(
@@ -176,9 +176,10 @@ class CoupledModel(Model[Plant]):
     def _list_grids(self, longest: float) -> Iterator[tuple[int, int]]:
         """Yield ticks that make one, and integration steps per such tick, the cheapest first."""
         # What is prescribed is smoothed from all its samples.
-        most = 1 if self._leaders else max(int(longest / self._period), 1)
+        most = 1 if self._leaders else max(int(COARSER * longest / self._period), 1)
         for every in range(most, 0, -1):
-            steps = math.ceil(every * self._period / longest)
+            # A record that is slow already has no ticks to spare: stiff servos need short steps.
+            steps = math.ceil(every * self._period / (longest if every == 1 else COARSER * longest))
             while steps <= self._steps * every:
                 yield every, steps
                 steps *= 2
