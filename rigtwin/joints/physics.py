@@ -227,9 +227,9 @@ class PrescribedJoints(IndependentJoints):
     def model(
         self, machine: Machine, inputs: Inputs, configuration: Configuration, steps: int
     ) -> Model[Any]:
-        from rigtwin.models.moved import MovedModel
+        from rigtwin.models.inverse_dynamics import InverseDynamicsModel
 
-        return MovedModel(machine, machine.replays[0], inputs)
+        return InverseDynamicsModel(machine, machine.replays[0], inputs)
 
     def reach(self, machine: Machine, channel: tuple[str, str]) -> tuple[float, float] | None:
         from rigtwin.joints.excitation import reach_of_component
@@ -260,9 +260,9 @@ class FreeJoints(PrescribedJoints):
     def model(
         self, machine: Machine, inputs: Inputs, configuration: Configuration, steps: int
     ) -> Model[Any]:
-        from rigtwin.models.coupled import CoupledModel
+        from rigtwin.models.forward_dynamics import ForwardDynamicsModel
 
-        return CoupledModel(machine, machine.replays[0], inputs, configuration, steps)
+        return ForwardDynamicsModel(machine, machine.replays[0], inputs, configuration, steps)
 
     def base_parameters(self, machine: Machine) -> tuple[Mapping[str, float], ...]:
         return ()

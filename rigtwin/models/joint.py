@@ -35,7 +35,7 @@ from rigtwin.description.control import FormulaControl
 from rigtwin.description.machine import OWN, Machine, ReplayOf, Row
 from rigtwin.models.basis import Passage, forms
 from rigtwin.models.following import follow_command
-from rigtwin.models.guided import RIGID, Inertia, Loop, integrate_pushed, inverse_dynamics
+from rigtwin.models.joint_motion import RIGID, Inertia, Loop, integrate_pushed, inverse_dynamics
 from rigtwin.models.joint_start import AT_REST, JointStart
 from rigtwin.models.model import Form, Model
 from rigtwin.models.start import Start

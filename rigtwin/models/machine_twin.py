@@ -15,9 +15,7 @@ from rigtwin.description.effects import apply_effects
 from rigtwin.description.limits import Tripped, find_trip, require_order
 from rigtwin.description.machine import OWN, Machine
 from rigtwin.errors import RigtwinError
-from rigtwin.models.carried_twin import carry
 from rigtwin.models.commanding import Command, Tick, command_by_formula, command_by_function
-from rigtwin.models.coupled_twin import list_parts, move_commanded, move_freely
 from rigtwin.models.demands import (
     Columns,
     check_demands,
@@ -25,7 +23,9 @@ from rigtwin.models.demands import (
     list_sensors,
     list_wanted,
 )
-from rigtwin.models.moved_twin import move_together
+from rigtwin.models.forward_twin import list_parts, simulate_controlled, simulate_forward
+from rigtwin.models.inverse_twin import simulate_prescribed
+from rigtwin.models.joint_twin import simulate_joint
 from rigtwin.models.reading import make_noise, round_reading, sensors_of
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Writer
@@ -154,13 +154,15 @@ def simulate_machine(
         mine = {name: given[name] for name in replay.moved_by if name in given}
         if replay.free and command is not None:
             own = [name for name in outputs if name in replay.moved_by]
-            moved = move_commanded(machine, replay, configuration, mine, own, command, noise, ticks)
+            moved = simulate_controlled(
+                machine, replay, configuration, mine, own, command, noise, ticks
+            )
         elif replay.free:
-            moved = move_freely(machine, replay, configuration, mine)
+            moved = simulate_forward(machine, replay, configuration, mine)
         elif len(replay.moved_by) > 1:
-            moved = move_together(machine, configuration, mine)
+            moved = simulate_prescribed(machine, configuration, mine)
         else:
-            moved = carry(machine, replay, configuration, mine)
+            moved = simulate_joint(machine, replay, configuration, mine)
         if not moved.sound:
             away += replay.free or (machine.name,)
         for name, signal in moved.signals.items():

@@ -10,7 +10,7 @@ import numpy as np
 from rigtwin.components.conditioning import Actuator, ActuatorState, condition, hold
 from rigtwin.components.servo import Push, push
 from rigtwin.description.machine import Row
-from rigtwin.models.coupled_motion import Contacts, State, StepInputs, advance
+from rigtwin.models.forward_motion import Contacts, State, StepInputs, advance
 from rigtwin.models.multibody import Bodies
 from rigtwin.numerics.arrays import Array
 

@@ -9,12 +9,12 @@ from rigtwin.components.sensors import apply_sensor
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Machine
 from rigtwin.models.inputs import inputs_of_test
-from rigtwin.models.moved import MovedModel
+from rigtwin.models.inverse_dynamics import InverseDynamicsModel
 from rigtwin.numerics.arrays import Array
 
 
 @dataclass(frozen=True)
-class Moved:
+class SimulatedSignals:
     """What a twin did. signals: component → reading or command, shape (ticks,); sound: whether all
     motions stayed within what a machine can do; whole: of which signals noise and bits are
     part."""
@@ -24,9 +24,9 @@ class Moved:
     whole: frozenset[str] = frozenset()
 
 
-def move_together(
+def simulate_prescribed(
     machine: Machine, configuration: Configuration, motions: dict[str, Array]
-) -> Moved:
+) -> SimulatedSignals:
     """What the sensors read, noise and bits apart.
 
     Parameters
@@ -40,7 +40,7 @@ def move_together(
 
     Returns
     -------
-    Moved
+    SimulatedSignals
         What the motions' sensors read, and those of the observed forces.
     """
     (replay,) = machine.replays
@@ -49,7 +49,7 @@ def move_together(
         name: apply_sensor(getattr(plant, name), motion, period) for name, motion in motions.items()
     }
     inputs = inputs_of_test(machine, found, period)
-    forces = MovedModel(machine, replay, inputs).predict_true(plant)
+    forces = InverseDynamicsModel(machine, replay, inputs).predict_true(plant)
     for row, force in zip(replay.rows, forces, strict=True):
         found[row.name] = apply_sensor(getattr(plant, row.name), force, period)
-    return Moved(found, True)
+    return SimulatedSignals(found, True)

@@ -13,8 +13,8 @@ from rigtwin.components.guide import dry_limits, friction, slide
 from rigtwin.description.catalogue import find
 from rigtwin.description.machine import Machine
 from rigtwin.models.following import follow_command
-from rigtwin.models.guided import Inertia, inverse_dynamics
 from rigtwin.models.joint import JointModel
+from rigtwin.models.joint_motion import Inertia, inverse_dynamics
 from rigtwin.recording import Recording
 from rigtwin.signals.noise import smooth
 from tests.helpers.described import described, recording_of

@@ -49,7 +49,7 @@ class Judged:
     responses: Array
 
 
-class CoupledStart:
+class InitialState:
     """Read from sensors; fitted where an error of it shows."""
 
     def __init__(self, seen: Mapping[str, Seen], place: Array, loose: int, period: float) -> None:

@@ -35,11 +35,11 @@ from rigtwin.components.servo import Push, push, push_law
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Component, Machine, ReplayOf, Row
 from rigtwin.models.basis import Passage, forms
-from rigtwin.models.coupled_motion import Contacts, Servos, State, StepInputs, advance
-from rigtwin.models.coupled_start import CoupledStart, Seen, Sense
 from rigtwin.models.following import follow_command
-from rigtwin.models.guided import RIGID
+from rigtwin.models.forward_motion import Contacts, Servos, State, StepInputs, advance
+from rigtwin.models.initial_state import InitialState, Seen, Sense
 from rigtwin.models.joint import ELASTIC, KEPT, LIGHTEST, SEED, SMALL, recover_motion
+from rigtwin.models.joint_motion import RIGID
 from rigtwin.models.model import Form, Model
 from rigtwin.models.multibody import Multibody, inertia_at
 from rigtwin.numerics.arrays import Array, contain, interpolate
@@ -56,7 +56,7 @@ THINNED = 5e-3
 """Share of a signal's own swing that longer steps may change for a search."""
 
 
-class CoupledModel(Model[Plant]):
+class ForwardDynamicsModel(Model[Plant]):
     """All joints of one recording."""
 
     def __init__(
@@ -125,21 +125,21 @@ class CoupledModel(Model[Plant]):
             and component.channel in inputs.channels
             and self._along[name].any()
         }
-        self._start = CoupledStart(seen, self._bodies.place(), self._loose, self._period)
+        self._start = InitialState(seen, self._bodies.place(), self._loose, self._period)
         self._loosest = self._find_loosest()
         self._changed: dict[tuple[object, ...], Multibody] = {}
         self._last: dict[tuple[object, ...], Array] = {}
         self._starts: dict[tuple[object, ...], Array] = {}
         self._judge_start()
 
-    def halve_steps(self) -> CoupledModel:
+    def halve_steps(self) -> ForwardDynamicsModel:
         return self._with_steps(max(1, self._steps // 2))
 
-    def double_steps(self) -> CoupledModel:
+    def double_steps(self) -> ForwardDynamicsModel:
         return self._with_steps(2 * self._steps)
 
-    def _with_steps(self, steps: int) -> CoupledModel:
-        return CoupledModel(
+    def _with_steps(self, steps: int) -> ForwardDynamicsModel:
+        return ForwardDynamicsModel(
             self._machine,
             self._replay,
             self._signals,
@@ -149,7 +149,7 @@ class CoupledModel(Model[Plant]):
             self._quick,
         )
 
-    def thin(self, longest: float) -> CoupledModel:
+    def thin(self, longest: float) -> ForwardDynamicsModel:
         """Return a coarser model for a search: fewer ticks and longer integration steps, as long
         as they change next to nothing, and errors of the start taken as linear."""
         plant = self._configuration.plant
@@ -159,7 +159,7 @@ class CoupledModel(Model[Plant]):
         for every, steps in self._list_grids(COARSER * longest):
             if (every, steps, quick) == (1, self._steps, False):
                 break
-            coarser = CoupledModel(
+            coarser = ForwardDynamicsModel(
                 self._machine,
                 self._replay,
                 _average_commands(self._signals, every),

@@ -16,7 +16,7 @@ from rigtwin.description.document import examine, load
 from rigtwin.diagnosis.diagnose import diagnose
 from rigtwin.errors import RigtwinError
 from rigtwin.joints.parts import parts
-from rigtwin.models.moved import MovedModel
+from rigtwin.models.inverse_dynamics import InverseDynamicsModel
 from tests.helpers.arm import (
     BELT,
     COUPLED,
@@ -143,7 +143,7 @@ def test_where_a_joint_rests_its_torque_says_nothing(tmp_path, moved):
     still[1, 2000:] = still[1, 2000]
     machine = described_arm(tmp_path)
     data = recording(still, torques(*moved), (0.0, 0.0))
-    found = MovedModel(machine, machine.replays[0], data.inputs).undetermined()
+    found = InverseDynamicsModel(machine, machine.replays[0], data.inputs).undetermined()
     assert found[1, 2100:-200].all()
     assert not found[0, 2100:-200].all()
 

@@ -15,16 +15,16 @@ from rigtwin.components.servo import push_law
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Machine, ReplayOf, Row
 from rigtwin.models.commanding import Command, Readings, commands_of
-from rigtwin.models.coupled import CoupledModel, begin
 from rigtwin.models.demands import list_pushers, list_sensors
+from rigtwin.models.forward_dynamics import ForwardDynamicsModel, begin
 from rigtwin.models.inputs import inputs_of_test
-from rigtwin.models.moved_twin import Moved
+from rigtwin.models.inverse_twin import SimulatedSignals
 from rigtwin.models.multibody import Multibody
 from rigtwin.models.stepped_twin import Drive, Sensing, SteppedTwin
 from rigtwin.numerics.arrays import Array, runs_away
 
 
-class CoupledTwin(CoupledModel):
+class ForwardDynamicsTwin(ForwardDynamicsModel):
     """All joints in a test to come, advanced tick by tick under a controller."""
 
     def _bodies_of(self, plant: Plant) -> Multibody:
@@ -68,7 +68,7 @@ class CoupledTwin(CoupledModel):
             steps=self._steps,
         )
 
-    def move_commanded(
+    def simulate_controlled(
         self,
         plant: Plant,
         outputs: Sequence[str],
@@ -168,9 +168,9 @@ def begin_live(
     return twin.begin(configuration.plant, outputs, sensors)
 
 
-def move_freely(
+def simulate_forward(
     machine: Machine, replay: ReplayOf, configuration: Configuration, demands: dict[str, Array]
-) -> Moved:
+) -> SimulatedSignals:
     """What the sensors read, noise and bits apart.
 
     Parameters
@@ -187,7 +187,7 @@ def move_freely(
 
     Returns
     -------
-    Moved
+    SimulatedSignals
         What all its sensors read.
     """
     plant, period = configuration.plant, configuration.timing.period
@@ -197,10 +197,10 @@ def move_freely(
         if row.name not in found:
             true = model.observe(row, moved)
             found[row.name] = apply_sensor(getattr(plant, row.name), true, period)
-    return Moved(found, not runs_away(moved))
+    return SimulatedSignals(found, not runs_away(moved))
 
 
-def move_commanded(
+def simulate_controlled(
     machine: Machine,
     replay: ReplayOf,
     configuration: Configuration,
@@ -209,14 +209,14 @@ def move_commanded(
     command: Command,
     noise: Mapping[str, Array],
     ticks: int,
-) -> Moved:
+) -> SimulatedSignals:
     """What the sensors read and what a controller commanded, noise and bits apart of what it does
     not read.
 
     Parameters
     ----------
     machine, replay, configuration, demands
-        As of `move_freely`.
+        As of `simulate_forward`.
     outputs
         Actuators that the controller commands.
     command
@@ -228,7 +228,7 @@ def move_commanded(
 
     Returns
     -------
-    Moved
+    SimulatedSignals
         Readings of all its sensors, and the commands of `outputs`.
     """
     plant, period = configuration.plant, configuration.timing.period
@@ -237,18 +237,18 @@ def move_commanded(
     sensors, readable = model.list_sensors(plant), list_sensors(machine)
     read = [row for row in sensors if row.name in readable]
     readings = Readings(plant, [row.name for row in read], noise, period, ticks)
-    moved, given = model.move_commanded(plant, outputs, command, readings, read)
+    moved, given = model.simulate_controlled(plant, outputs, command, readings, read)
     for row in sensors:
         if row.name not in readings.signals:
             true = model.observe(row, moved)
             found[row.name] = apply_sensor(getattr(plant, row.name), true, period)
     signals = {**found, **readings.signals, **dict(zip(outputs, given, strict=True))}
-    return Moved(signals, not runs_away(moved), frozenset({*readings.signals, *outputs}))
+    return SimulatedSignals(signals, not runs_away(moved), frozenset({*readings.signals, *outputs}))
 
 
 def _at_start(
     machine: Machine, replay: ReplayOf, configuration: Configuration, demands: dict[str, Array]
-) -> tuple[CoupledTwin, dict[str, Array]]:
+) -> tuple[ForwardDynamicsTwin, dict[str, Array]]:
     """The machine before its test, and what the sensors read that prescribe motions."""
     plant, period = configuration.plant, configuration.timing.period
     found = {
@@ -259,4 +259,4 @@ def _at_start(
     inputs = inputs_of_test(machine, {**demands, **found}, period)
     unobserved = replace(replay, rows=())
     steps = configuration.substeps
-    return CoupledTwin(machine, unobserved, inputs, configuration, steps), found
+    return ForwardDynamicsTwin(machine, unobserved, inputs, configuration, steps), found

@@ -20,7 +20,7 @@ from rigtwin.components import Guide
 from rigtwin.components.guide import Friction, damping, dry_limits, position_force, slide
 from rigtwin.components.mount import give_way
 from rigtwin.components.servo import Push, pull, push
-from rigtwin.models.guided import SHORTEST
+from rigtwin.models.joint_motion import SHORTEST
 from rigtwin.models.multibody import Bodies, find_terms
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel

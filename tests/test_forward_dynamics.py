@@ -16,7 +16,7 @@ from rigtwin.description.document import load
 from rigtwin.description.machine import Machine
 from rigtwin.diagnosis.stops import find_cut_commands
 from rigtwin.errors import RigtwinError
-from rigtwin.models.coupled import CoupledModel
+from rigtwin.models.forward_dynamics import ForwardDynamicsModel
 from tests.helpers.coupled import ARM, ARM_TOML, PERIOD, arm, described, integrate, recording
 
 TIME = np.arange(1000) * PERIOD
@@ -56,10 +56,10 @@ def slides(folder: Path, replay: str, extra: str = "") -> Machine:
 
 def coupled(
     machine: Machine, columns: dict[str, dict[str, np.ndarray]], steps: int = 1
-) -> CoupledModel:
+) -> ForwardDynamicsModel:
     record = recording(machine, columns)
     model = machine.physics.model(machine, record.inputs, machine.configuration_of(record), steps)
-    assert isinstance(model, CoupledModel)
+    assert isinstance(model, ForwardDynamicsModel)
     return model
 
 

@@ -21,8 +21,8 @@ from rigtwin.components.plant import Plant
 from rigtwin.components.sensors import apply_sensor
 from rigtwin.description.machine import Component, Machine, ReplayOf, Row
 from rigtwin.models.basis import Passage, forms
-from rigtwin.models.guided import resist, resist_at_once
 from rigtwin.models.joint import ELASTIC, KEPT, SEED, SMALL, recover_motion
+from rigtwin.models.joint_motion import resist, resist_at_once
 from rigtwin.models.model import Form, Model
 from rigtwin.models.rigid import RigidBodies
 from rigtwin.numerics.arrays import Array
@@ -42,7 +42,7 @@ Kinematics = Array
 """Positions, velocities and accelerations, shape (3, joints, ticks)."""
 
 
-class MovedModel(Model[Plant]):
+class InverseDynamicsModel(Model[Plant]):
     """All joints of one recording."""
 
     def __init__(
@@ -51,7 +51,7 @@ class MovedModel(Model[Plant]):
         replay: ReplayOf,
         inputs: Inputs,
         every: int = 1,
-        like: MovedModel | None = None,
+        like: InverseDynamicsModel | None = None,
     ) -> None:
         """every: ticks from one that is predicted to the next; like: one of the same recording,
         whose motions were smoothed already. Raises RigtwinError if a channel is missing."""
@@ -112,11 +112,11 @@ class MovedModel(Model[Plant]):
     def _smooth(self, signal: Array) -> tuple[Array, float]:
         return smooth(signal, self._period)
 
-    def thin(self, longest: float) -> MovedModel:
+    def thin(self, longest: float) -> InverseDynamicsModel:
         every = max(int(longest / self._period), 1)
         if every <= self.every:
             return self
-        return MovedModel(self._machine, self._replay, self._signals, every, self)
+        return InverseDynamicsModel(self._machine, self._replay, self._signals, every, self)
 
     def _move(self, plant: Plant, shifts: Mapping[str, Array] | None = None) -> Kinematics:
         """How the joints move. shifts: of measured motions, shape (ticks,) of the recording."""

@@ -12,15 +12,15 @@ from rigtwin.components.sensors import apply_sensor
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Machine, ReplayOf, Row
 from rigtwin.models.inputs import inputs_of_test
+from rigtwin.models.inverse_twin import SimulatedSignals
 from rigtwin.models.joint import JointModel
-from rigtwin.models.moved_twin import Moved
 from rigtwin.models.reading import sensors_of
 from rigtwin.numerics.arrays import Array, runs_away
 
 
-def carry(
+def simulate_joint(
     machine: Machine, replay: ReplayOf, configuration: Configuration, demands: dict[str, Array]
-) -> Moved:
+) -> SimulatedSignals:
     """What the sensors read, noise and bits apart.
 
     Parameters
@@ -37,7 +37,7 @@ def carry(
 
     Returns
     -------
-    Moved
+    SimulatedSignals
         What all sensors of that joint read.
     """
     plant, period, components = configuration.plant, configuration.timing.period, machine.components
@@ -60,4 +60,4 @@ def carry(
         row.name: apply_sensor(getattr(plant, row.name), moved[places[row.kind]], period)
         for row in rows
     }
-    return Moved(found, not runs_away(moved))
+    return SimulatedSignals(found, not runs_away(moved))
