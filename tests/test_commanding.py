@@ -162,7 +162,7 @@ def test_where_nothing_can_be_commanded_it_is_said(tmp_path: Path) -> None:
     )
     led = TABLES.replace('free = ["rail", "pivot"]', 'free = ["pivot"]') + by_formula()
     (tmp_path / "led.toml").write_text(led)
-    with pytest.raises(rigtwin.RigtwinError, match="takes the demand .reference.; there are force"):
+    with pytest.raises(rigtwin.RigtwinError, match="unknown demand .reference.; this test takes force"):
         rigtwin.run(tmp_path / "led.toml", step)
 
 

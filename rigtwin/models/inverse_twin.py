@@ -1,4 +1,4 @@
-"""The twin of joints that act on each other: what their sensors read while a test moves them."""
+"""Twin of coupled joints with prescribed motion: sensor readings of a test, by inverse dynamics."""
 
 from __future__ import annotations
 
@@ -15,9 +15,17 @@ from rigtwin.numerics.arrays import Array
 
 @dataclass(frozen=True)
 class SimulatedSignals:
-    """What a twin did. signals: component → reading or command, shape (ticks,); sound: whether all
-    motions stayed within what a machine can do; whole: of which signals noise and bits are
-    part."""
+    """Signals of a simulated test of one part of a machine.
+
+    Attributes
+    ----------
+    signals : mapping of str to Array
+        Component → reading or command, shape (ticks,).
+    sound : bool
+        Whether the motion stayed bounded.
+    whole : frozenset of str
+        Components whose signals already contain noise and quantisation.
+    """
 
     signals: Mapping[str, Array]
     sound: bool
@@ -27,29 +35,29 @@ class SimulatedSignals:
 def simulate_prescribed(
     machine: Machine, configuration: Configuration, motions: dict[str, Array]
 ) -> SimulatedSignals:
-    """What the sensors read, noise and bits apart.
+    """Simulate a test of joints that all move as prescribed.
 
     Parameters
     ----------
     machine
-        Its description.
+        Description of the machine.
     configuration
-        With the effects that it has.
+        Settings of the test, with the effects applied.
     motions
-        Component that senses a joint's motion → where that joint goes, rad or m, shape (ticks,).
+        Sensor of a joint's motion → position of that joint, rad or m, shape (ticks,).
 
     Returns
     -------
     SimulatedSignals
-        What the motions' sensors read, and those of the observed forces.
+        Readings of the motions' sensors and of the observed forces, without noise and quantisation.
     """
     (replay,) = machine.replays
     plant, period = configuration.plant, configuration.timing.period
-    found = {
+    readings = {
         name: apply_sensor(getattr(plant, name), motion, period) for name, motion in motions.items()
     }
-    inputs = inputs_of_test(machine, found, period)
+    inputs = inputs_of_test(machine, readings, period)
     forces = InverseDynamicsModel(machine, replay, inputs).predict_true(plant)
     for row, force in zip(replay.rows, forces, strict=True):
-        found[row.name] = apply_sensor(getattr(plant, row.name), force, period)
-    return SimulatedSignals(found, True)
+        readings[row.name] = apply_sensor(getattr(plant, row.name), force, period)
+    return SimulatedSignals(readings, True)
