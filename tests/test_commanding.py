@@ -162,7 +162,9 @@ def test_where_nothing_can_be_commanded_it_is_said(tmp_path: Path) -> None:
     )
     led = TABLES.replace('free = ["rail", "pivot"]', 'free = ["pivot"]') + by_formula()
     (tmp_path / "led.toml").write_text(led)
-    with pytest.raises(rigtwin.RigtwinError, match="unknown demand .reference.; this test takes force"):
+    with pytest.raises(
+        rigtwin.RigtwinError, match="unknown demand .reference.; this test takes force"
+    ):
         rigtwin.run(tmp_path / "led.toml", step)
 
 

@@ -1,6 +1,7 @@
-"""Every kind of effect there is, and the effects that a plant of given components can have.
+"""Library of all kinds of effect, and the effects that a plant can have.
 
-`setting@controller` is besides: any setting that is not what the operator wrote down.
+One effect is not listed here: `setting@controller`, a controller setting that differs from the
+operator's record.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ KINDS: tuple[Kind, ...] = tuple(
 
 
 def candidates(plant: Plant) -> Iterator[Effect]:
-    """All effects that a plant can have, component by component."""
+    """Yield all effects that a plant can have, component by component."""
     for group, component in plant._asdict().items():
         for kind in KINDS:
             if type(component) in kind.at:
@@ -28,32 +29,38 @@ def candidates(plant: Plant) -> Iterator[Effect]:
 
 
 def title(kind: str) -> str:
-    """What a kind of effect is called in a sentence."""
+    """Return the title of a kind of effect, or its name if it is unknown."""
     return next((each.title for each in KINDS if each.name == kind), kind)
 
 
 def find(name: str, plant: Plant) -> Effect:
-    """The effect of that name.
+    """Return an effect by its name.
 
     Parameters
     ----------
     name
-        `KIND@COMPONENT`, such as `coulomb@rail`.
+        Name `KIND@COMPONENT`, such as `coulomb@rail`.
     plant
-        The plant that is to have it.
+        Plant that gets the effect.
+
+    Returns
+    -------
+    Effect
+        Effect at that component.
 
     Raises
     ------
     RigtwinError
-        If it cannot have it; the message says what there is.
+        If the plant cannot have the effect; the message lists what is available.
     """
     effects = {effect.name: effect for effect in candidates(plant)}
     if name in effects:
         return effects[name]
     kind, _, component = name.partition("@")
-    there = [effect.kind.name for effect in effects.values() if effect.component == component]
-    if there:
-        raise RigtwinError(f"unknown effect {kind!r} at {component}; there are {', '.join(there)}")
+    available = [effect.kind.name for effect in effects.values() if effect.component == component]
+    if available:
+        kinds = ", ".join(available)
+        raise RigtwinError(f"unknown effect {kind!r} at {component}; there are {kinds}")
     known = ", ".join(dict.fromkeys(effect.component for effect in effects.values()))
     raise RigtwinError(
         f"unknown effect {name!r}; expected KIND@COMPONENT with a component of {known}"
