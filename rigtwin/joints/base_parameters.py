@@ -1,6 +1,8 @@
-"""Base parameters: the sums of inertial parameters that are all that the forces of joints can ever
-show of bodies and rotors (Gautier and Khalil, IEEE Transactions on Robotics and Automation 6(3),
-1990; numerically, as in Gautier, Journal of Robotic Systems 8(4), 1991).
+"""Base parameters: the sums of inertial parameters that joint forces can identify.
+
+Forces are linear in the inertial parameters, τ = Y·π. Linearly dependent columns of the regressor Y
+can only be identified as sums (Gautier and Khalil, IEEE Transactions on Robotics and Automation
+6(3), 1990; numerically as in Gautier, Journal of Robotic Systems 8(4), 1991).
 """
 
 from __future__ import annotations
@@ -16,30 +18,30 @@ from rigtwin.models.rigid import RigidBodies
 from rigtwin.numerics.arrays import Array
 
 STATES, SEED = 200, 23
-"""Motions of all joints that are made up, each a moment, and where their random numbers begin."""
+"""Number of random states at which the regressor is evaluated, and seed of these states."""
 SPREAD = (1.0, 2.0, 10.0)
 """rms of positions, velocities and accelerations, in rad or m and seconds."""
 DEPENDENT = 1e-8
-"""Share of a column's length that others leave of it, below which it is their sum."""
+"""Relative residual of a column below which it is a linear combination of earlier columns."""
 COUNTS = 1e-6
-"""Least coefficient that is no rounding."""
+"""Smallest coefficient that is not a rounding error."""
 
 
 def find_base_parameters(machine: Machine) -> tuple[Mapping[str, float], ...]:
-    """What of the inertia of a machine's bodies and rotors can be seen, whatever it does.
+    """Find the base parameters of a machine's bodies and rotors.
 
     Parameters
     ----------
     machine
-        Of joints that act on each other and move as measured, with bodies among its components;
-        all other bodies are taken as known.
+        Machine of coupled joints with prescribed motion, with bodies among its components. Bodies
+        that are not components are taken as known.
 
     Returns
     -------
     tuple of mappings
-        The base parameters, independent of each other: parameter → its coefficient in the sum, that
-        of the first 1. A parameter is `component.name`, with the names of `INERTIAL`, or `inertia`
-        of a rotor; one that is in no sum is never seen. Empty for other machines.
+        Independent sums: parameter → coefficient, with 1 for the first. A parameter is
+        `component.name`, with the names of `INERTIAL`, or `inertia` of a rotor. A parameter in no
+        sum cannot be identified. Empty for other machines.
     """
     plant, components = machine.plant, machine.components
     at: dict[type, list[Component]] = {Body: [], Rotor: [], Guide: []}
@@ -57,30 +59,36 @@ def find_base_parameters(machine: Machine) -> tuple[Mapping[str, float], ...]:
     for rotor in at[Rotor]:
         along = np.array([dict(rotor.acts_on).get(joint, 0.0) for joint in joints])
         columns[f"{rotor.name}.inertia"] = np.outer(along, along @ motion[2])[rows].ravel()
-    # What is further out is said in terms of what is further in.
+    # Rotors first, then bodies from the base outwards: a dependent parameter of an outer body is
+    # added to those of inner bodies.
     for body in at[Body]:
-        found = bodies.regressor(motion, body.mjcf)[:, rows].reshape(len(INERTIAL), -1)
-        columns |= {f"{body.name}.{word}": each for word, each in zip(INERTIAL, found, strict=True)}
+        regressor = bodies.regressor(motion, body.mjcf)[:, rows].reshape(len(INERTIAL), -1)
+        columns |= {
+            f"{body.name}.{word}": each for word, each in zip(INERTIAL, regressor, strict=True)
+        }
     return _sum_up(columns)
 
 
 def _sum_up(columns: Mapping[str, Array]) -> tuple[Mapping[str, float], ...]:
-    """Independent sums of columns' parameters: a column that is a sum of those before adds its
-    parameter to theirs."""
+    """Return independent sums of the columns' parameters.
+
+    A column that is a linear combination of earlier ones adds its parameter to their sums.
+    """
     chosen: list[str] = []
     sums: dict[str, dict[str, float]] = {}
     for name, column in columns.items():
         size = float(np.linalg.norm(column))
         if size == 0.0:
             continue
-        before = np.stack([columns[each] for each in chosen], axis=1) if chosen else None
+        before = np.stack([columns[earlier] for earlier in chosen], axis=1) if chosen else None
         if before is not None:
+            # Columns of kg, kg m and kg m² differ in size: normalise before the least squares.
             lengths = np.linalg.norm(before, axis=0)
             shares = np.linalg.lstsq(before / lengths, column, rcond=None)[0] / lengths
             if float(np.linalg.norm(column - before @ shares)) < DEPENDENT * size:
-                for each, share in zip(chosen, shares, strict=True):
+                for earlier, share in zip(chosen, shares, strict=True):
                     if abs(share) > COUNTS:
-                        sums[each][name] = float(share)
+                        sums[earlier][name] = float(share)
                 continue
         chosen.append(name)
         sums[name] = {name: 1.0}

@@ -77,6 +77,7 @@ class IndependentJoints(Physics):
         joints = [
             JointModel(machine, replay, inputs, configuration, steps) for replay in machine.replays
         ]
+        # One joint needs no numbering of its disturbances.
         return joints[0] if len(joints) == 1 else IndependentModel(joints)
 
     def record(
@@ -111,6 +112,7 @@ class IndependentJoints(Physics):
     ) -> Recording:
         from rigtwin.models.machine_twin import simulate_machine
 
+        # Without limits, the motion shows how far the machine would go.
         unlimited: Any = Nothing()
         configuration = configuration._replace(safety=unlimited)
         columns, _ = simulate_machine(machine, configuration, demands, seed)

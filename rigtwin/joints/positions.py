@@ -1,4 +1,4 @@
-"""Where a machine's joints stand, from its signals alone."""
+"""Positions of a machine's joints, from its signals alone."""
 
 from __future__ import annotations
 
@@ -14,43 +14,46 @@ from rigtwin.numerics.arrays import Array
 def joint_positions(
     machine: Machine, columns: Mapping[str, Mapping[str, Array]], period: float
 ) -> dict[str, Array]:
-    """Positions of a machine's joints.
+    """Return the positions of a machine's joints.
 
     Parameters
     ----------
     machine
-        That the signals are of.
+        Machine the signals belong to.
     columns
-        Topic → field → values, shape (ticks,), as recordings have them.
+        Topic → field → values, shape (ticks,), as in recordings.
     period
-        s, from tick to tick.
+        Time from tick to tick, s.
 
     Returns
     -------
     dict of Array
-        Joint → position at every tick, m or rad: as measured, else as commanded, else as its
-        velocity adds up to. Joints that the signals say nothing of are left out.
+        Joint → position at every tick, m or rad: measured, else commanded, else the integral of the
+        velocity. Joints without any of these signals are left out.
     """
-    found: dict[str, Array] = {}
+    positions: dict[str, Array] = {}
     for wanted in ("position", "command", "velocity"):
         for name, component in machine.components.items():
             part = getattr(machine.plant, name)
-            says = "command" if isinstance(part, PositionActuator) else measures(part)
+            quantity = "command" if isinstance(part, PositionActuator) else measures(part)
             signal = _find_signal(component, columns)
-            if says != wanted or signal is None or component.joint in ("", *found):
+            if quantity != wanted or signal is None or component.joint in ("", *positions):
                 continue
+            # The mean velocity is an offset of the sensor and would integrate to a drift.
             summed = np.cumsum(signal - np.mean(signal)) * period
-            found[component.joint] = summed if wanted == "velocity" else signal
+            positions[component.joint] = summed if wanted == "velocity" else signal
     for name, component in machine.components.items():
-        # What is measured between joints says where the last of them is.
+        # A sensor of a sum of joints gives the one unknown joint among them.
         signal = _find_signal(component, columns)
-        unknown = [(joint, share) for joint, share in component.acts_on if joint not in found]
+        unknown = [(joint, share) for joint, share in component.acts_on if joint not in positions]
         if measures(getattr(machine.plant, name)) == "position" and len(unknown) == 1:
-            known = [share * found[joint] for joint, share in component.acts_on if joint in found]
+            known = [
+                share * positions[joint] for joint, share in component.acts_on if joint in positions
+            ]
             if signal is not None:
                 ((joint, share),) = unknown
-                found[joint] = (signal - sum(known)) / share
-    return found
+                positions[joint] = (signal - sum(known)) / share
+    return positions
 
 
 def _find_signal(component: Component, columns: Mapping[str, Mapping[str, Array]]) -> Array | None:
