@@ -199,7 +199,7 @@ def test_a_limit_ends_the_test_at_the_first_tick_beyond_it(tmp_path: Path) -> No
     assert np.array_equal(made["/sensor.place"], whole[: first + 1])
 
 
-def test_what_falls_meets_a_limit_before_it_runs_away(tmp_path: Path) -> None:
+def test_a_falling_mass_meets_a_limit_before_it_diverges(tmp_path: Path) -> None:
     of = machine(tmp_path, LIMITS)
     fall = rigtwin.run(of, lambda *_: {"force": np.full(TICKS, -0.5)})
     assert fall.end == "trip: angle below -0.5 rad"
