@@ -236,9 +236,7 @@ def test_an_impossible_replay_is_refused(tmp_path: Path, replay: str, said: str)
         ('command_high = "wide"', "command_high"),
     ],
 )
-def test_impossible_command_limits_are_refused(
-    tmp_path: Path, limits: str, said: str
-) -> None:
+def test_impossible_command_limits_are_refused(tmp_path: Path, limits: str, said: str) -> None:
     push = f'push = {{ actuator = "push", {limits} }}'
     toml = "\n".join(
         push if line.startswith("push = ") else line for line in SLIDES_TOML.splitlines()
