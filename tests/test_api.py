@@ -176,10 +176,10 @@ def test_experiments_and_controllers_of_ones_own_run_a_described_machine(tmp_pat
     asked = 500.0 * (recording["/command.goal"] - recording["/sensor.position"])
     np.testing.assert_allclose(recording["/command.force"], asked, atol=1e-9)
     with pytest.raises(
-        rigtwin.RigtwinError, match="no demand for /command.force; a test gives force"
+        rigtwin.RigtwinError, match="no demand for /command.force; this test needs force"
     ):
         rigtwin.run(machine, lambda _configuration, _seed: {}, settings=SHORT)
-    with pytest.raises(rigtwin.RigtwinError, match="nothing takes the demand 'torque'"):
+    with pytest.raises(rigtwin.RigtwinError, match="unknown demand 'torque'"):
         rigtwin.run(machine, lambda c, _: {"torque": np.zeros(c.ticks), "force": np.zeros(c.ticks)})
 
 

@@ -162,7 +162,9 @@ def test_where_nothing_can_be_commanded_it_is_said(tmp_path: Path) -> None:
     )
     led = TABLES.replace('free = ["rail", "pivot"]', 'free = ["pivot"]') + by_formula()
     (tmp_path / "led.toml").write_text(led)
-    with pytest.raises(rigtwin.RigtwinError, match="takes the demand .reference.; there are force"):
+    with pytest.raises(
+        rigtwin.RigtwinError, match="unknown demand .reference.; this test takes force"
+    ):
         rigtwin.run(tmp_path / "led.toml", step)
 
 
@@ -197,7 +199,7 @@ def test_a_limit_ends_the_test_at_the_first_tick_beyond_it(tmp_path: Path) -> No
     assert np.array_equal(made["/sensor.place"], whole[: first + 1])
 
 
-def test_what_falls_meets_a_limit_before_it_runs_away(tmp_path: Path) -> None:
+def test_a_falling_mass_meets_a_limit_before_it_diverges(tmp_path: Path) -> None:
     of = machine(tmp_path, LIMITS)
     fall = rigtwin.run(of, lambda *_: {"force": np.full(TICKS, -0.5)})
     assert fall.end == "trip: angle below -0.5 rad"

@@ -1,5 +1,8 @@
-"""What a machine is made of. One noun a file: its parameters with unit, bounds and source, its law
-as compilable functions, the effects that it can have, and where a search for each starts."""
+"""Components of a machine, one noun a file.
+
+A component has parameters (unit, bounds, source), a law in compilable functions, the kinds of
+effect that it can have, and the values from which a search for each effect starts.
+"""
 
 from rigtwin.components.actuators import ForceActuator, PositionActuator
 from rigtwin.components.body import Base, Body

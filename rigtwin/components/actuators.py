@@ -1,5 +1,8 @@
-"""Actuators of a described machine: parameters alone. Units are those of a joint that slides; of
-one that turns, read rad for m and Nm for N. What becomes of a command is in `conditioning`."""
+"""Parameters of a described machine's actuators.
+
+Units are those of a sliding joint; for a turning joint, read rad for m and Nm for N. The law from
+command to force is in `conditioning`, that from command to position in `models.following`.
+"""
 
 from __future__ import annotations
 
@@ -9,11 +12,14 @@ from rigtwin.components.quantity import MJCF, NONE, UNLIMITED, Quantity
 
 
 class ForceActuator(NamedTuple):
-    """Command to force: limits of the command, delay, deadband, gain, saturation, rate limit, lag,
-    `constant`, then the limit of the force, in that order. The gain is larger by the share
-    ½·gain_asymmetry of positive commands, and smaller of negative ones; the deadband reaches
-    ½·deadband_asymmetry further to positive commands, and less far to negative ones."""
+    """Actuator whose command becomes a force.
 
+    Order of operations: limits of the command, delay, deadband, gain, saturation, rate limit, lag,
+    `constant`, limit of the force. The gain is gain·(1 ± ½·gain_asymmetry) and the deadband
+    deadband ± ½·deadband_asymmetry, with the upper sign for positive commands.
+    """
+
+    # Static law and limits, by the MJCF: force = constant · conditioned command.
     constant: Annotated[float, Quantity("N/unit of the command", 1e-9, 1e9, MJCF)] = 1.0
     force_limit: Annotated[float, Quantity("N", 1e-9, UNLIMITED, MJCF)] = UNLIMITED
     command_low: Annotated[
@@ -22,6 +28,7 @@ class ForceActuator(NamedTuple):
     command_high: Annotated[float, Quantity("unit of the command", -UNLIMITED, UNLIMITED, MJCF)] = (
         UNLIMITED
     )
+    # Conditioning of the command; neutral in the nominal machine.
     gain: Annotated[float, Quantity("1", 0.05, 5.0, "1: as specified")] = 1.0
     gain_asymmetry: Annotated[float, Quantity("1", -2.0, 2.0, NONE)] = 0.0
     lag: Annotated[float, Quantity("s", 0.0, 10.0, NONE)] = 0.0
@@ -37,14 +44,20 @@ class ForceActuator(NamedTuple):
 
 
 class PositionActuator(NamedTuple):
-    """Command to position; without any effect it follows at once: limits of the command, delay,
-    deadband (a play), gain and offset, saturation, rate limit, then lag and second lag, or a
-    resonance."""
+    """Actuator whose command becomes a position, whatever resists.
 
+    Order of operations: limits of the command, delay, deadband (a backlash), gain and offset,
+    saturation, rate limit, first and second lag, resonance. Without any effect it follows its
+    command at once.
+    """
+
+    # Limits of the command, by the MJCF.
     command_low: Annotated[float, Quantity("m", -UNLIMITED, UNLIMITED, MJCF)] = -UNLIMITED
     command_high: Annotated[float, Quantity("m", -UNLIMITED, UNLIMITED, MJCF)] = UNLIMITED
+    # Static response: gain · command + offset.
     gain: Annotated[float, Quantity("1", 0.05, 5.0, "1: follows its command at rest")] = 1.0
     offset: Annotated[float, Quantity("m", -100.0, 100.0, NONE)] = 0.0
+    # Dynamics: 1/(T1·s + 1) · 1/(T2·s + 1) · ω²/(s² + 2ζω·s + ω²).
     lag: Annotated[float, Quantity("s", 0.0, 10.0, NONE)] = 0.0
     second_lag: Annotated[float, Quantity("s", 0.0, 10.0, NONE)] = 0.0
     natural_frequency: Annotated[float, Quantity("Hz", 1e-3, UNLIMITED, NONE)] = UNLIMITED

@@ -1,9 +1,8 @@
-"""A rigid body of joints that move together: its ten inertial parameters, and what can be other
-about them than told.
+"""Rigid body of coupled joints: its ten inertial parameters and the effects on them.
 
-The forces that a motion takes are linear in mass, first moment and moments of inertia about the
-body's own frame (Atkeson, An and Hollerbach, International Journal of Robotics Research 5(3),
-1986). Whatever values the components here have within their bounds, such a body can be made: its
+The forces of a motion are linear in mass, first moment and moments of inertia about the body's own
+frame (Atkeson, An and Hollerbach, International Journal of Robotics Research 5(3), 1986). For all
+parameter values within the bounds of this file the body is physically consistent: its
 pseudo-inertia matrix is positive definite (Wensing, Kim and Slotine, IEEE Robotics and Automation
 Letters 3(1), 2018; Sousa and Cortesão, International Journal of Robotics Research 33(6), 2014).
 """
@@ -19,28 +18,33 @@ from rigtwin.components.quantity import MJCF, NONE, Quantity
 from rigtwin.numerics.arrays import Array
 
 INERTIAL = ("mass", "mx", "my", "mz", "ixx", "iyy", "izz", "ixy", "ixz", "iyz")
-"""The ten parameters: kg, kg m and kg m², about the body's frame."""
+"""Names of the ten inertial parameters about the body's frame: mass, kg; first moment, kg m;
+moments and products of inertia, kg m²."""
 PLACES = ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-"""Where a payload is looked for first, in reaches from the centre of mass, to either side."""
+"""Starting positions of a payload, in reaches from the centre of mass; tried to either side."""
 PAYLOADS = (0.3, 3.0)
-"""Masses of a payload that is looked for, in masses of the body: heavy ones, as mass times lever
-leads a search that starts too light away from where it has to go."""
+"""Starting masses of a payload, in masses of the body. One is heavy: with too light a start, the
+product of mass and lever leads the search to a lever that is too long."""
 FURTHEST = 6.0
-"""Reaches from its frame at which a payload can sit."""
+"""Largest distance of a payload from the body's frame, in reaches."""
 TILT = 0.8
-"""rad, by which a base can be off level."""
+"""Largest tilt of a base, rad."""
 
 
 class Body(NamedTuple):
-    """A rigid body. centre: of mass, in its own frame, m; inertia: about the centre of mass, a
-    factor on what its shape gives a mass; reach: how far it extends from its frame, for a search;
-    payload: a point mass fixed to it at payload_x, payload_y, payload_z of its frame."""
+    """Rigid body with a payload.
 
+    The moments of inertia scale with the mass, as if the body kept its shape, and with the factor
+    `inertia`. The payload is a point mass fixed to the body.
+    """
+
+    # Mass, centre of mass in the body's frame, factor on the moments of inertia about the latter.
     mass: Annotated[float, Quantity("kg", 1e-9, 1e6, MJCF)] = 1.0
     centre_x: Annotated[float, Quantity("m", -100.0, 100.0, MJCF)] = 0.0
     centre_y: Annotated[float, Quantity("m", -100.0, 100.0, MJCF)] = 0.0
     centre_z: Annotated[float, Quantity("m", -100.0, 100.0, MJCF)] = 0.0
     inertia: Annotated[float, Quantity("1", 0.01, 100.0, "1: as the MJCF has it")] = 1.0
+    # Extent of the body from its frame; it scales the search for a payload.
     reach: Annotated[float, Quantity("m", 1e-6, 100.0, MJCF)] = 1.0
     payload: Annotated[float, Quantity("kg", 0.0, 1e6, NONE)] = 0.0
     payload_x: Annotated[float, Quantity("m", -100.0, 100.0, NONE)] = 0.0
@@ -49,8 +53,11 @@ class Body(NamedTuple):
 
 
 class Base(NamedTuple):
-    """What a machine stands on. tilt_x, tilt_y, tilt_z: rad that it is turned about its own axes,
-    off what the MJCF's gravity says."""
+    """Base of a machine, which may be off level.
+
+    The tilts are rotations about x, then y, then z of the base, from the orientation that the
+    MJCF's gravity implies.
+    """
 
     tilt_x: Annotated[float, Quantity("rad", -TILT, TILT, "0: level")] = 0.0
     tilt_y: Annotated[float, Quantity("rad", -TILT, TILT, "0: level")] = 0.0
@@ -58,21 +65,23 @@ class Base(NamedTuple):
 
 
 def about_frame(mass: float, centre: Array, inertia: Array) -> Array:
-    """The ten parameters of a body.
+    """Return the ten inertial parameters of a body about its frame.
+
+    The parallel-axis theorem gives I_frame = I_centre + m·(cᵀc·1 − c·cᵀ).
 
     Parameters
     ----------
     mass
-        kg.
+        Mass, kg.
     centre
-        Of mass, in the body's frame, m, shape (3,).
+        Centre of mass in the body's frame, m, shape (3,).
     inertia
-        About the centre of mass, along the frame's axes, kg m², shape (3, 3).
+        Inertia about the centre of mass, along the frame's axes, kg m², shape (3, 3).
 
     Returns
     -------
     array
-        In the order of `INERTIAL`, shape (10,).
+        Parameters in the order of `INERTIAL`, shape (10,).
     """
     about = inertia + mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
     moments = [about[0, 0], about[1, 1], about[2, 2], about[0, 1], about[0, 2], about[1, 2]]
@@ -80,81 +89,111 @@ def about_frame(mass: float, centre: Array, inertia: Array) -> Array:
 
 
 def list_parameters(body: Body, mass: float, inertia: Array) -> Array:
-    """The ten parameters of a body and what is fixed to it.
+    """Return the ten inertial parameters of a body with its payload.
 
     Parameters
     ----------
     body
-        With whatever is other about it.
-    mass, inertia
-        What the MJCF says of the body alone: kg, and kg m² about its centre of mass along the
-        frame's axes, shape (3, 3).
+        Body with its effects.
+    mass
+        Mass of the body in the MJCF, kg.
+    inertia
+        Inertia of the body in the MJCF, about its centre of mass along the frame's axes, kg m²,
+        shape (3, 3).
 
     Returns
     -------
     array
-        In the order of `INERTIAL`, shape (10,).
+        Parameters in the order of `INERTIAL`, shape (10,).
     """
     share = body.mass / mass if mass > 0.0 else 1.0
     centre = np.array([body.centre_x, body.centre_y, body.centre_z])
     place = np.array([body.payload_x, body.payload_y, body.payload_z])
-    own = about_frame(body.mass, centre, body.inertia * share * inertia)
-    return own + about_frame(body.payload, place, np.zeros((3, 3)))
+    body_parameters = about_frame(body.mass, centre, body.inertia * share * inertia)
+    return body_parameters + about_frame(body.payload, place, np.zeros((3, 3)))
 
 
 def list_surplus(body: Body, mass: float, centre: Array, inertia: Array) -> Array:
-    """What the ten parameters are more than the MJCF's.
+    """Return the change of the ten inertial parameters from those of the MJCF.
 
     Parameters
     ----------
     body
-        With whatever is other about it.
-    mass, centre, inertia
-        What the MJCF says of the body alone: kg, m, shape (3,), and kg m² about its centre of mass
-        along the frame's axes, shape (3, 3).
+        Body with its effects.
+    mass
+        Mass of the body in the MJCF, kg.
+    centre
+        Centre of mass in the MJCF, m, shape (3,).
+    inertia
+        Inertia in the MJCF, about the centre of mass along the frame's axes, kg m², shape (3, 3).
 
     Returns
     -------
     array
-        In the order of `INERTIAL`, shape (10,).
+        Differences in the order of `INERTIAL`, shape (10,).
     """
     return list_parameters(body, mass, inertia) - about_frame(mass, centre, inertia)
 
 
 def arrange_pseudo_inertia(parameters: Array) -> Array:
-    """The pseudo-inertia matrix of ten parameters, shape (4, 4): positive definite for every body
-    that can be made, and for no other (Wensing, Kim and Slotine 2018)."""
+    """Return the pseudo-inertia matrix of ten inertial parameters.
+
+    With Σ = ½·tr(I)·1 − I and the first moment h, it is [[Σ, h], [hᵀ, m]]. It is positive definite
+    exactly for physically consistent bodies (Wensing, Kim and Slotine 2018).
+
+    Parameters
+    ----------
+    parameters
+        Parameters in the order of `INERTIAL`, shape (10,).
+
+    Returns
+    -------
+    array
+        Pseudo-inertia matrix, shape (4, 4).
+    """
     mass, mx, my, mz, ixx, iyy, izz, ixy, ixz, iyz = parameters
     about = np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
-    found = np.empty((4, 4))
-    found[:3, :3] = 0.5 * np.trace(about) * np.eye(3) - about
-    found[:3, 3] = found[3, :3] = (mx, my, mz)
-    found[3, 3] = mass
-    return found
+    pseudo_inertia = np.empty((4, 4))
+    pseudo_inertia[:3, :3] = 0.5 * np.trace(about) * np.eye(3) - about
+    pseudo_inertia[:3, 3] = pseudo_inertia[3, :3] = (mx, my, mz)
+    pseudo_inertia[3, 3] = mass
+    return pseudo_inertia
 
 
 def turn_gravity(base: Base, gravity: Array) -> Array:
-    """Gravity, m/s², shape (3,), as a base that is turned about x, then y, then z of its own
-    sees it."""
+    """Return gravity in the frame of a tilted base.
+
+    Parameters
+    ----------
+    base
+        Base with its tilts about x, y and z.
+    gravity
+        Gravity in the frame of the level base, m/s², shape (3,).
+
+    Returns
+    -------
+    array
+        Gravity in the frame of the tilted base, m/s², shape (3,).
+    """
     turned = gravity
     for axis, angle in enumerate(base):
-        one, other = (axis + 1) % 3, (axis + 2) % 3
+        first, second = (axis + 1) % 3, (axis + 2) % 3
         rotation = np.eye(3)
-        rotation[one, one] = rotation[other, other] = np.cos(angle)
+        rotation[first, first] = rotation[second, second] = np.cos(angle)
         # The base turns one way, so gravity turns the other in its frame.
-        rotation[one, other], rotation[other, one] = np.sin(angle), -np.sin(angle)
+        rotation[first, second], rotation[second, first] = np.sin(angle), -np.sin(angle)
         turned = rotation @ turned
     return turned
 
 
-def _displaced(at: Context) -> Starts:
-    reach = float(getattr(at.plant, at.effect.group).reach)
-    values = [at.nominal + share * reach for share in (-0.2, -0.05, 0.05, 0.2)]
+def _displaced(context: Context) -> Starts:
+    reach = float(getattr(context.plant, context.effect.group).reach)
+    values = [context.nominal + share * reach for share in (-0.2, -0.05, 0.05, 0.2)]
     return Starts.single(values, 0.005 * reach)
 
 
-def _loaded(at: Context) -> Starts:
-    body: Body = getattr(at.plant, at.effect.group)
+def _loaded(context: Context) -> Starts:
+    body: Body = getattr(context.plant, context.effect.group)
     centre = np.array([body.centre_x, body.centre_y, body.centre_z])
     values = []
     for share in PAYLOADS:
@@ -162,6 +201,7 @@ def _loaded(at: Context) -> Starts:
             for side in (1.0, -1.0) if any(place) else (1.0,):
                 at_place = centre + side * body.reach * np.array(place)
                 values.append((share * body.mass, *at_place.tolist()))
+    # The step of each derivative is a small share of the body's mass and reach.
     far = FURTHEST * body.reach
     return Starts(
         tuple(values),

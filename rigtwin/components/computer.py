@@ -9,8 +9,9 @@ from rigtwin.components.quantity import Quantity
 
 
 class Computer(NamedTuple):
-    """The computer that runs the controller."""
+    """Computer that runs the controller."""
 
+    # Share of ticks at which the outputs keep their values, and delay of all commands.
     missed_ticks: Annotated[
         float, Quantity("1", 0.0, 0.5, "0: real-time computer; a share of all ticks")
     ] = 0.0
@@ -18,7 +19,7 @@ class Computer(NamedTuple):
 
 
 class Mains(NamedTuple):
-    """The hum that all sensors pick up, each with a phase of its own."""
+    """Mains voltage, whose hum all sensors pick up, with a different phase for each."""
 
     frequency: Annotated[float, Quantity("Hz", 1.0, 400.0, "mains, thesis §3.4")] = 50.0
 

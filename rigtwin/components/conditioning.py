@@ -1,7 +1,16 @@
-"""What becomes of a command or a signal on its way: delay, deadband, gain, saturation, rate limit,
-lag, in that order.
+"""Conditioning of a command before it acts, and the kinds of effect on commands and sensors.
 
-All of them are neutral in the nominal machine, whose commands pass as they are.
+With the command u[k] at step k, the order of operations is
+
+    limits      u ← clip(u, low, high)
+    delay       u ← u[k − delay]
+    deadband    u ← sign(u)·max(|u| − band, 0)  (amplifier), or a backlash of ±band (valve)
+    gain        u ← gain·(1 ± uneven)·u, by the direction of u
+    saturation  u ← clip(u, −saturation, saturation)
+    rate limit  y ← y + clip(u − y, −rate, rate)
+    lag         z ← z + (1 − exp(−h/T))·(y − z)
+
+All of them are neutral in the nominal machine, whose commands pass unchanged.
 """
 
 from __future__ import annotations
@@ -37,45 +46,56 @@ ACTS_LATE = "the force acts later than it is recorded, as that of an actuator be
 
 
 class Actuator(NamedTuple):
-    """low, high: of the command. delay: in timesteps. zero_centred: whether the deadband lies about
-    zero (an amplifier) or about the last position (a valve's overlap). reach: by how much further
-    it goes to positive commands, and less far to negative ones. uneven: share of the gain that
-    positive commands have more and negative ones less. rate: greatest change a timestep.
-    share: of the way to its input that the lag goes in a timestep."""
+    """Conditioning of a command as compiled code takes it, for one timestep."""
 
-    neutral: bool
-    low: float
-    high: float
-    delay: float
-    deadband: float
-    zero_centred: bool
-    reach: float
-    gain: float
-    uneven: float
-    saturation: float
-    rate: float
-    share: float
+    neutral: bool  # Whether a command within its limits passes unchanged.
+    low: float  # Smallest command.
+    high: float  # Largest command.
+    delay: float  # Delay in timesteps.
+    deadband: float  # Half-width of the deadband, in the command's unit.
+    zero_centred: bool  # Deadband about zero (amplifier) or about the last output (valve overlap).
+    reach: float  # Widening of the deadband to positive commands, and narrowing to negative ones.
+    gain: float  # Mean gain of both directions.
+    uneven: float  # Share of the gain added for positive commands and taken from negative ones.
+    saturation: float  # Largest magnitude after the gain.
+    rate: float  # Largest change in a timestep.
+    share: float  # Share of the remaining distance that the lag covers in a timestep.
 
 
 class ActuatorState(NamedTuple):
-    """history: past commands, a ring; memory: where the ring stands, the deadband's output, the
-    rate limit's, the lag's."""
+    """State of a command's conditioning; changed in place."""
 
-    history: Array
-    memory: Array
+    history: Array  # Past commands, a ring buffer.
+    memory: Array  # Position in the ring, output of deadband, of rate limit, of lag; shape (4,).
 
 
-def actuator(of: Motor | Cylinder | Pusher, computer: Computer, timestep: float) -> Actuator:
-    """The conditioning of a motor's voltage, a cylinder's position or a force actuator's or servo's
-    command. A servo's deadband is of its error, not of its command."""
-    delay = of.delay + computer.delay
-    rate = UNLIMITED if isinstance(of, Cylinder) else of.rate_limit
-    uneven = 0.5 * of.gain_asymmetry if isinstance(of, ForceActuator) else 0.0
-    reach = 0.5 * of.deadband_asymmetry if isinstance(of, ForceActuator) else 0.0
-    deadband, saturation = (
-        (0.0, UNLIMITED) if isinstance(of, Servo) else (of.deadband, of.saturation)
-    )
-    neutral = (delay, deadband, reach, of.gain, uneven, saturation, rate, of.lag) == (
+def actuator(component: Motor | Cylinder | Pusher, computer: Computer, timestep: float) -> Actuator:
+    """Return the conditioning of an actuator's command.
+
+    Parameters
+    ----------
+    component
+        Motor (voltage), cylinder (position), force actuator or servo.
+    computer
+        Computer, whose delay adds to the actuator's.
+    timestep
+        Step at which the command is conditioned, s.
+
+    Returns
+    -------
+    Actuator
+        Conditioning, discretised for that step.
+    """
+    # A cylinder has a speed limit of its own, behind its dynamics. The deadband of a servo lies in
+    # its position error, in `servo`.
+    delay = component.delay + computer.delay
+    rate = UNLIMITED if isinstance(component, Cylinder) else component.rate_limit
+    uneven = 0.5 * component.gain_asymmetry if isinstance(component, ForceActuator) else 0.0
+    reach = 0.5 * component.deadband_asymmetry if isinstance(component, ForceActuator) else 0.0
+    deadband, saturation = 0.0, UNLIMITED
+    if not isinstance(component, Servo):
+        deadband, saturation = component.deadband, component.saturation
+    neutral = (delay, deadband, reach, component.gain, uneven, saturation, rate, component.lag) == (
         0.0,
         0.0,
         0.0,
@@ -85,16 +105,16 @@ def actuator(of: Motor | Cylinder | Pusher, computer: Computer, timestep: float)
         UNLIMITED,
         0.0,
     )
-    share = 1.0 if of.lag == 0.0 else 1.0 - math.exp(-timestep / of.lag)
+    share = 1.0 if component.lag == 0.0 else 1.0 - math.exp(-timestep / component.lag)
     return Actuator(
         neutral=neutral,
-        low=of.command_low if isinstance(of, PUSHERS) else -UNLIMITED,
-        high=of.command_high if isinstance(of, PUSHERS) else UNLIMITED,
+        low=component.command_low if isinstance(component, PUSHERS) else -UNLIMITED,
+        high=component.command_high if isinstance(component, PUSHERS) else UNLIMITED,
         delay=delay / timestep,
         deadband=deadband,
-        zero_centred=not isinstance(of, Cylinder | Servo),
+        zero_centred=not isinstance(component, Cylinder | Servo),
         reach=reach,
-        gain=of.gain,
+        gain=component.gain,
         uneven=uneven,
         saturation=saturation,
         rate=rate * timestep if rate < UNLIMITED else UNLIMITED,
@@ -103,7 +123,7 @@ def actuator(of: Motor | Cylinder | Pusher, computer: Computer, timestep: float)
 
 
 def hold(conditioning: Actuator, command: float) -> ActuatorState:
-    """The state in which `command` has been held for long."""
+    """Return the state after a command, in its unit, has been held for long."""
     command = min(max(command, conditioning.low), conditioning.high)
     state = ActuatorState(ring(conditioning.delay, command), np.array([0.0, command, 0.0, 0.0]))
     state.memory[2:] = limit(conditioning, state, command)
@@ -112,12 +132,14 @@ def hold(conditioning: Actuator, command: float) -> ActuatorState:
 
 @compilable
 def limit(conditioning: Actuator, state: ActuatorState, command: float) -> float:
-    """Deadband, gain and saturation."""
+    """Apply deadband, gain and saturation to a command; advance the deadband's state."""
     band = conditioning.deadband
     if conditioning.zero_centred:
+        # The edge of the side on which the command lies: band ± reach.
         edge = max(band + math.copysign(conditioning.reach, command * conditioning.reach), 0.0)
         passed = math.copysign(max(abs(command) - edge, 0.0), command)
     else:
+        # Play operator: the output moves only once the command has crossed the overlap.
         passed = min(max(state.memory[1], command - band), command + band)
         state.memory[1] = passed
     uneven = conditioning.uneven
@@ -127,8 +149,19 @@ def limit(conditioning: Actuator, state: ActuatorState, command: float) -> float
 
 @compilable
 def condition(conditioning: Actuator, state: ActuatorState, command: float) -> float:
-    """What acts over the coming timestep. Advances the state by one timestep."""
+    """Return the conditioned command over the coming timestep; advance the state by one timestep.
+
+    Parameters
+    ----------
+    conditioning
+        Conditioning of the command.
+    state
+        State of the conditioning, changed in place.
+    command
+        Command of this timestep, in its unit.
+    """
     command = min(max(command, conditioning.low), conditioning.high)
+    # The usual case in a search for other effects: skip the work, but keep the last output.
     if conditioning.neutral:
         state.memory[3] = command
         return command
@@ -145,31 +178,44 @@ def condition(conditioning: Actuator, state: ActuatorState, command: float) -> f
 def condition_all(
     conditioning: Actuator, state: ActuatorState, commands: Array, steps: int, out: Array
 ) -> None:
-    """What acts at each step, written to `out`, shape (steps · ticks,). commands: shape
-    (ticks,)."""
+    """Condition the commands of a whole test.
+
+    Parameters
+    ----------
+    conditioning
+        Conditioning of the command, discretised for a step.
+    state
+        State of the conditioning, changed in place.
+    commands
+        Command at each tick, shape (ticks,), held from tick to tick.
+    steps
+        Steps per tick.
+    out
+        Conditioned command, written, shape (steps · ticks,).
+    """
     for tick in range(len(commands)):
         for step in range(steps):
             out[tick * steps + step] = condition(conditioning, state, commands[tick])
 
 
 BELOW = (0.95, 0.8, 0.65, 0.5, 0.35, 0.2, 0.1)
-"""Shares of a known limit at which a lower one is looked for."""
+"""Starting values of a lower limit, as shares of the known limit."""
 
 
-def _speed_limit(at: Context) -> Starts:
-    known = [share * getattr(at.plant, at.effect.group).speed_limit for share in BELOW]
-    return at_limits([min(pair) for pair in zip(at.swing.fastest, known, strict=True)], 1e-6)
+def _speed_limit(context: Context) -> Starts:
+    known = [share * getattr(context.plant, context.effect.group).speed_limit for share in BELOW]
+    return at_limits([min(pair) for pair in zip(context.swing.fastest, known, strict=True)], 1e-6)
 
 
-def _deadband(at: Context) -> Starts:
-    placed = at.effect.of in (PositionActuator, Servo)
-    size = at.scales.stroke if placed else max(at.swing.largest[0], 1e-12)
+def _deadband(context: Context) -> Starts:
+    placed = context.effect.of in (PositionActuator, Servo)
+    size = context.scales.stroke if placed else max(context.swing.largest[0], 1e-12)
     return Starts.single([share * size for share in (0.003, 0.01, 0.03, 0.1, 0.3)], 0.001 * size)
 
 
-def _uneven_deadband(at: Context) -> Starts:
-    """Of which one side alone, or most of it, has none."""
-    size = max(at.swing.largest[0], 1e-12)
+def _uneven_deadband(context: Context) -> Starts:
+    """Return starts of a deadband that lies on one side only."""
+    size = max(context.swing.largest[0], 1e-12)
     starts = [
         (2.0 * sign * share * size, share * size)
         for share in (0.01, 0.03, 0.1, 0.3)
@@ -178,38 +224,40 @@ def _uneven_deadband(at: Context) -> Starts:
     return Starts(tuple(starts), (0.001 * size, 0.001 * size))
 
 
-def _yielding(at: Context) -> Starts:
-    # A plate is set to zero without load, or under about the load that it bears in the test.
-    starts = tuple(product((2e-7, 1e-6, 5e-6), (0.0, 0.005), (0.0, at.scales.force)))
+def _yielding(context: Context) -> Starts:
+    # A plate's zero was set without load, or under about the load that it bears in the test.
+    starts = tuple(product((2e-7, 1e-6, 5e-6), (0.0, 0.005), (0.0, context.scales.force)))
     return Starts(starts, (2e-8, 2e-4, 20.0))
 
 
-def _offset(at: Context) -> Starts:
-    sizes = {ForceSensor: at.scales.force, VelocitySensor: at.scales.speed}
-    size = sizes.get(at.effect.of, at.scales.stroke)
+def _offset(context: Context) -> Starts:
+    sizes = {ForceSensor: context.scales.force, VelocitySensor: context.scales.speed}
+    size = sizes.get(context.effect.of, context.scales.stroke)
     return Starts.single([share * size for share in (-0.2, -0.02, 0.02, 0.2)], 0.002 * size)
 
 
-def _drift(at: Context) -> Starts:
-    sizes = {ForceSensor: at.scales.force, VelocitySensor: at.scales.speed}
-    size = sizes.get(at.effect.of, at.scales.stroke) / at.scales.time
+def _drift(context: Context) -> Starts:
+    sizes = {ForceSensor: context.scales.force, VelocitySensor: context.scales.speed}
+    size = sizes.get(context.effect.of, context.scales.stroke) / context.scales.time
     return Starts.single([share * size for share in (-2e-3, -2e-4, 2e-4, 2e-3)], 2e-5 * size)
 
 
-def _two_lags(at: Context) -> Starts:
-    time = at.scales.time
+def _two_lags(context: Context) -> Starts:
+    time = context.scales.time
     sizes = [share * time for share in (0.005, 0.02, 0.06, 0.2)]
     starts = tuple((long, ratio * long) for long in sizes for ratio in (0.2, 0.7))
     return Starts(starts, (0.002 * time, 0.002 * time))
 
 
-def _resonance(at: Context) -> Starts:
-    slowest = 1.0 / (2.0 * math.pi * at.scales.time)
+def _resonance(context: Context) -> Starts:
+    # Natural frequencies are tried from about that of the motion upwards.
+    slowest = 1.0 / (2.0 * math.pi * context.scales.time)
     speeds = [slowest * ratio for ratio in (1.5, 4.0, 10.0, 30.0, 80.0)]
     return Starts(tuple(product(speeds, (0.15, 0.5, 0.9))), (0.02 * slowest, 0.01))
 
 
-def _each(guess: Guess | None, *types: type) -> dict[type, Guess | None]:
+def _for_types(guess: Guess | None, *types: type) -> dict[type, Guess | None]:
+    """Return the same starts for several types of component; None: read off the signals."""
     return dict.fromkeys(types, guess)
 
 
@@ -223,24 +271,24 @@ KINDS = (
         "gain",
         "gain",
         ("gain",),
-        "output by this factor",
-        _each(fixed_starts((0.8, 0.93, 1.07, 1.2), 0.004), *RIG, *DESCRIBED),
+        "output multiplied by this factor",
+        _for_types(fixed_starts((0.8, 0.93, 1.07, 1.2), 0.004), *RIG, *DESCRIBED),
     ),
     Kind(
         "gain_asymmetry",
         "gain that differs by direction",
         ("gain_asymmetry",),
         "output greater for positive commands than for negative, by this share",
-        _each(fixed_starts((-0.3, -0.07, 0.07, 0.3), 0.004), ForceActuator),
+        _for_types(fixed_starts((-0.3, -0.07, 0.07, 0.3), 0.004), ForceActuator),
         "output smaller for positive commands than for negative, by this share",
     ),
     Kind(
         "lag",
         "lag",
         ("lag",),
-        "a first-order lag more",
-        _each(fixed_starts((5e-4, 2e-3, 6e-3, 2e-2, 5e-2), 1e-4), *RIG)
-        | _each(late_starts, *DESCRIBED)
+        "an additional first-order lag",
+        _for_types(fixed_starts((5e-4, 2e-3, 6e-3, 2e-2, 5e-2), 1e-4), *RIG)
+        | _for_types(late_starts, *DESCRIBED)
         | {ForceSensor: late_or_early_starts},
         ACTS_LATE,
     ),
@@ -248,9 +296,9 @@ KINDS = (
         "delay",
         "delay",
         ("delay",),
-        "a delay more",
-        _each(fixed_starts((5e-4, 2e-3, 5e-3, 1e-2, 2e-2), 1e-4), *RIG, Computer)
-        | _each(late_starts, *DESCRIBED)
+        "an additional delay",
+        _for_types(fixed_starts((5e-4, 2e-3, 5e-3, 1e-2, 2e-2), 1e-4), *RIG, Computer)
+        | _for_types(late_starts, *DESCRIBED)
         | {ForceSensor: late_or_early_starts},
         ACTS_LATE,
     ),
@@ -259,8 +307,8 @@ KINDS = (
         "saturation",
         ("saturation",),
         "command limited to this magnitude",
-        _each(lambda at: at_limits(at.swing.largest, 1e-6), Motor, Cylinder)
-        | _each(lambda at: at_limits(at.swing.largest, 1e-9), *LIMITED_COMMANDS),
+        _for_types(lambda context: at_limits(context.swing.largest, 1e-6), Motor, Cylinder)
+        | _for_types(lambda context: at_limits(context.swing.largest, 1e-9), *LIMITED_COMMANDS),
     ),
     Kind(
         "deadband",
@@ -270,7 +318,7 @@ KINDS = (
         {
             Motor: fixed_starts((0.02, 0.08, 0.3), 0.004),
             Cylinder: fixed_starts((1e-4, 5e-4, 2e-3, 6e-3), 2e-5),
-            **_each(_deadband, *DESCRIBED_ACTUATORS),
+            **_for_types(_deadband, *DESCRIBED_ACTUATORS),
         },
     ),
     Kind(
@@ -278,7 +326,7 @@ KINDS = (
         "deadband that differs by direction",
         ("deadband_asymmetry", "deadband"),
         "command without effect within a band that reaches further to positive commands",
-        _each(_uneven_deadband, ForceActuator),
+        _for_types(_uneven_deadband, ForceActuator),
         "command without effect within a band that reaches further to negative commands",
     ),
     Kind(
@@ -287,8 +335,10 @@ KINDS = (
         ("rate_limit",),
         "command's rate limited",
         {
-            Motor: lambda at: at_limits(at.swing.fastest, 1e-6),
-            **_each(lambda at: at_limits(at.swing.fastest, 1e-9), *DESCRIBED_ACTUATORS),
+            Motor: lambda context: at_limits(context.swing.fastest, 1e-6),
+            **_for_types(
+                lambda context: at_limits(context.swing.fastest, 1e-9), *DESCRIBED_ACTUATORS
+            ),
         },
     ),
     Kind("rate_limit", "rate limit", ("speed_limit",), "speed limited", {Cylinder: _speed_limit}),
@@ -329,7 +379,7 @@ KINDS = (
         {
             Lvdt: fixed_starts((-2e-3, -3e-4, 3e-4, 2e-3), 1e-5),
             LoadCell: fixed_starts((-20.0, -4.0, 4.0, 20.0), 0.1),
-            **_each(_offset, *DESCRIBED_SENSORS, PositionActuator),
+            **_for_types(_offset, *DESCRIBED_SENSORS, PositionActuator),
         },
     ),
     Kind(
@@ -340,7 +390,7 @@ KINDS = (
         {
             Lvdt: fixed_starts((-2e-4, -3e-5, 3e-5, 2e-4), 2e-6),
             LoadCell: fixed_starts((-2.0, -0.3, 0.3, 2.0), 0.02),
-            **_each(_drift, *DESCRIBED_SENSORS),
+            **_for_types(_drift, *DESCRIBED_SENSORS),
         },
     ),
     Kind(
@@ -348,20 +398,20 @@ KINDS = (
         "mains hum",
         ("hum",),
         "amplitude of the mains line",
-        _each(None, *DECLARED, *DESCRIBED_SENSORS),
+        _for_types(None, *DECLARED, *DESCRIBED_SENSORS),
     ),
     Kind(
         "noise",
         "white noise",
         ("white",),
         "white noise, rms",
-        _each(None, *DECLARED, *DESCRIBED_SENSORS),
+        _for_types(None, *DECLARED, *DESCRIBED_SENSORS),
     ),
     Kind(
         "quantisation",
         "quantisation",
         ("resolution",),
         "size of one bit",
-        _each(None, *DECLARED, *DESCRIBED_SENSORS),
+        _for_types(None, *DECLARED, *DESCRIBED_SENSORS),
     ),
 )

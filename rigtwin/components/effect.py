@@ -1,7 +1,7 @@
-"""What an effect is: another value of a component's parameters, and where a search for it starts.
+"""Effects and kinds of effect: changed parameters of a component, and the starts of a search.
 
-A kind of effect is declared once, beside the law that has its parameters. `library` collects the
-kinds.
+An effect changes a component's parameters from their nominal values. Its kind is declared once,
+beside the law that has the parameters. `library` collects the kinds.
 """
 
 from __future__ import annotations
@@ -16,18 +16,25 @@ from rigtwin.components.quantity import Quantity, fields
 from rigtwin.numerics.arrays import Array
 
 SHARES = (0.9999, 0.999, 0.98, 0.9, 0.75, 0.5, 0.3)
-"""Of the time; a limit is looked for at the values that a command exceeds for the rest of it."""
+"""Quantiles of a command's magnitude and rate at which a search for a limit starts."""
 TINY = 1e-12
 NAMES = {"computer": "controller"}
-"""What a component is called in effects, where that is not its name among the parameters."""
+"""Component of the plant → its name in effects, where they differ."""
 GROUPS = {component: group for group, component in NAMES.items()}
-"""The other way round."""
+"""Name in effects → component of the plant."""
 
 
 @dataclass(frozen=True)
 class Swing:
-    """How far and fast a command went: the magnitude, in its unit, and the rate, unit/s, that it
-    stays below for these `SHARES` of the time."""
+    """Magnitude and rate of a command, as quantiles.
+
+    Attributes
+    ----------
+    largest : tuple of float
+        Magnitudes below which the command stays for `SHARES` of the time, in its unit.
+    fastest : tuple of float
+        Rates below which it stays for `SHARES` of the time, unit/s.
+    """
 
     largest: tuple[float, ...] = (0.0,) * len(SHARES)
     fastest: tuple[float, ...] = (0.0,) * len(SHARES)
@@ -35,7 +42,13 @@ class Swing:
 
 @dataclass(frozen=True)
 class Motion:
-    """What a component goes through, shape (ticks,) each: position m, its rate m/s, force N."""
+    """Motion of a component.
+
+    Attributes
+    ----------
+    position, speed, force : Array
+        Position, m, velocity, m/s, and force, N, shape (ticks,) each.
+    """
 
     position: Array
     speed: Array
@@ -44,8 +57,19 @@ class Motion:
 
 @dataclass(frozen=True)
 class Scales:
-    """Sizes of what a component goes through: half its stroke m, speed m/s, acceleration m/s²,
-    force N, rms each but the first; fastest: its highest speed, m/s; period: of a tick, s."""
+    """Sizes of a component's motion, by which a search is scaled.
+
+    Attributes
+    ----------
+    stroke : float
+        Half the range of positions, m.
+    speed, acceleration, force : float
+        rms values, m/s, m/s² and N.
+    fastest : float
+        Highest speed, m/s.
+    period : float
+        Time from tick to tick, s.
+    """
 
     stroke: float
     speed: float
@@ -56,30 +80,48 @@ class Scales:
 
     @property
     def time(self) -> float:
-        """s in which the component goes its stroke."""
+        """Characteristic time of the motion, stroke / speed, s."""
         return max(self.stroke / self.speed, self.period)
 
     @classmethod
     def of(cls, motion: Motion, force: float, period: float) -> Scales:
-        """Of a motion. force: rms of what is measured of it, N."""
-        own = float(np.sqrt(np.mean(motion.force**2)))
+        """Return the scales of a motion.
+
+        Parameters
+        ----------
+        motion
+            Motion of the component.
+        force
+            rms of the force measured there, N.
+        period
+            Time from tick to tick, s.
+        """
+        rms = float(np.sqrt(np.mean(motion.force**2)))
         return cls(
             stroke=max(0.5 * float(np.ptp(motion.position)), TINY),
             speed=max(float(np.sqrt(np.mean(motion.speed**2))), TINY),
             fastest=max(float(np.max(np.abs(motion.speed))), TINY),
             acceleration=max(float(np.std(np.gradient(motion.speed, period))), TINY),
-            force=max(force, own, TINY),
+            force=max(force, rms, TINY),
             period=period,
         )
 
 
 @dataclass(frozen=True)
 class Starts:
-    """Where a search starts: values, one tuple each in the order of the effect's parameters.
+    """Starting values of a search for an effect.
 
-    steps: fine ones for derivatives. quadrature: whether starts come in pairs a quarter of a wave
-    apart, (amplitude, pitch, 0) and (amplitude, pitch, π/2), so that any phase is a blend of both.
-    bounds: narrower ones than the parameters' own, by what the recording can show.
+    Attributes
+    ----------
+    values : tuple of tuple of float
+        Starting values, each in the order of the effect's parameters.
+    steps : tuple of float
+        Step of each parameter for numerical derivatives.
+    quadrature : bool
+        Whether starts come in pairs a quarter of a wave apart, (amplitude, pitch, 0) and
+        (amplitude, pitch, π/2). A linear combination of both gives any phase.
+    bounds : tuple of pairs or None
+        Bounds of the parameters by what the recording can show; None for the parameters' own.
     """
 
     values: tuple[tuple[float, ...], ...]
@@ -89,14 +131,26 @@ class Starts:
 
     @classmethod
     def single(cls, values: Sequence[float], step: float) -> Starts:
-        """Of an effect with one parameter."""
+        """Return the starts of an effect with one parameter."""
         return cls(tuple((value,) for value in values), (step,))
 
 
 @dataclass(frozen=True)
 class Context:
-    """What is known where a search starts: the effect, the plant without it, how far the commands
-    went, and the sizes of what its component goes through, worked out when they are asked for."""
+    """Information from which the starts of a search follow.
+
+    Attributes
+    ----------
+    effect : Effect
+        Effect that is searched for.
+    plant : Plant
+        Plant without the effect.
+    swing : Swing
+        Quantiles of the component's command.
+    scales_of : callable
+        Function that returns the sizes of the component's motion; called only on demand, as it
+        simulates the machine.
+    """
 
     effect: Effect
     plant: Plant
@@ -105,11 +159,12 @@ class Context:
 
     @property
     def scales(self) -> Scales:
+        """Sizes of the component's motion."""
         return self.scales_of()
 
     @property
     def nominal(self) -> float:
-        """The magnitude that the plant has already."""
+        """Magnitude of the effect in the plant: the value of its first parameter."""
         return self.effect.nominal(self.plant)[self.effect.kind.parameters[0]]
 
 
@@ -118,13 +173,26 @@ Guess = Callable[[Context], Starts]
 
 @dataclass(frozen=True)
 class Kind:
-    """A sort of effect.
+    """Kind of effect.
 
-    title: its name in a sentence; parameters: of the component that it sets, the first its
-    magnitude; meaning: what it does; at: type of component that can have it → where the search
-    starts, None where it is read off the signals instead; negative: what it does where its
-    magnitude is below zero, if that is something else; nuisances: parameters that must be fitted
-    with it but say nothing of it, such as the load at which a thing was set to zero.
+    Attributes
+    ----------
+    name : str
+        Name in effects, as in `coulomb@rail`.
+    title : str
+        Name in a sentence.
+    parameters : tuple of str
+        Parameters of the component that the effect changes. The first is its magnitude.
+    meaning : str
+        Description of the effect.
+    at : mapping
+        Type of component that can have the effect → function of the search's starts. None where
+        the value is read off the signals instead.
+    negative : str
+        Description of an effect of negative magnitude, if it differs.
+    nuisances : tuple of str
+        Parameters that are fitted with the effect but do not describe it, such as the load at which
+        a zero was set.
     """
 
     name: str
@@ -153,7 +221,17 @@ def _kind_of(name: str, types: list[str]) -> Kind:
 
 @dataclass(frozen=True)
 class Effect:
-    """A kind at a component of the plant. group: the component's name there; of: its type."""
+    """Kind of effect at one component of the plant.
+
+    Attributes
+    ----------
+    kind : Kind
+        Kind of effect.
+    group : str
+        Name of the component in the plant.
+    of : type
+        Type of the component.
+    """
 
     kind: Kind
     group: str
@@ -161,42 +239,54 @@ class Effect:
 
     @property
     def component(self) -> str:
+        """Name of the component in effects."""
         return NAMES.get(self.group, self.group)
 
     @property
     def name(self) -> str:
+        """Name of the effect, `KIND@COMPONENT`."""
         return f"{self.kind.name}@{self.component}"
 
     @property
     def searched(self) -> bool:
-        """Whether it is searched for; others are read off the signals."""
+        """Whether the effect is searched for rather than read off the signals."""
         return self.kind.at[self.of] is not None
 
     def quantities(self) -> dict[str, Quantity]:
-        """Its parameters: name → unit, bounds, source."""
+        """Return the unit, bounds and source of each parameter, by name."""
         meanings = fields(self.of)
-        found = {name: meanings[name] for name in self.kind.parameters}
-        return {name: each for name, each in found.items() if isinstance(each, Quantity)}
+        changed = {name: meanings[name] for name in self.kind.parameters}
+        return {name: each for name, each in changed.items() if isinstance(each, Quantity)}
 
     def nominal(self, plant: Plant) -> dict[str, float]:
-        """Its parameters' values in a plant."""
+        """Return the values of the effect's parameters in a plant, by name."""
         component = getattr(plant, self.group)
         return {name: float(getattr(component, name)) for name in self.kind.parameters}
 
     def starts(self, plant: Plant, swing: Swing, scales_of: Callable[[], Scales]) -> Starts:
-        """Where a search for it starts. It has to be one that is searched for."""
+        """Return the starts of a search for the effect.
+
+        Parameters
+        ----------
+        plant
+            Plant without the effect.
+        swing
+            Quantiles of the component's command.
+        scales_of
+            Function that returns the sizes of the component's motion.
+        """
         guess = self.kind.at[self.of]
         assert guess is not None
         return guess(Context(self, plant, swing, scales_of))
 
 
 def fixed_starts(values: Sequence[float], step: float) -> Guess:
-    """The same values wherever it is searched for."""
+    """Return a guess of fixed values, whatever the recording."""
     return lambda _: Starts.single(values, step)
 
 
 def shares_of_nominal(shares: Sequence[float], step: float) -> Guess:
-    """Shares of the nominal value."""
+    """Return a guess of shares of the nominal value."""
 
     def guess(at: Context) -> Starts:
         nominal = at.nominal
@@ -206,7 +296,7 @@ def shares_of_nominal(shares: Sequence[float], step: float) -> Guess:
 
 
 def shares_of_size(size: Callable[[Scales], float], shares: Sequence[float], step: float) -> Guess:
-    """Shares of the nominal value, or of a size of the motion where there is none."""
+    """Return a guess of shares of the nominal value, or of the motion's size where that is zero."""
 
     def guess(at: Context) -> Starts:
         unit = at.nominal if at.nominal > 0.0 else size(at.scales)
@@ -216,18 +306,18 @@ def shares_of_size(size: Callable[[Scales], float], shares: Sequence[float], ste
 
 
 def around_nominal(size: Callable[[Scales], float], shares: Sequence[float], step: float) -> Guess:
-    """Shares of a size of the motion on top of the nominal value."""
+    """Return a guess of the nominal value plus shares of the motion's size, within bounds."""
 
     def guess(at: Context) -> Starts:
         meaning = at.effect.quantities()[at.effect.kind.parameters[0]]
-        there, unit = at.nominal, size(at.scales)
-        values = [min(max(there + share * unit, meaning.low), meaning.high) for share in shares]
-        return Starts.single([v for v in dict.fromkeys(values) if v != there], step * unit)
+        nominal, unit = at.nominal, size(at.scales)
+        values = [min(max(nominal + share * unit, meaning.low), meaning.high) for share in shares]
+        return Starts.single([v for v in dict.fromkeys(values) if v != nominal], step * unit)
 
     return guess
 
 
 def at_limits(values: Sequence[float], least: float) -> Starts:
-    """A limit at each of these values."""
+    """Return starts of a limit at these values, none of them below `least`."""
     tried = tuple(dict.fromkeys(max(value, 1e-3 * max(values), least) for value in values))
     return Starts.single(tried, 0.004 * max(float(np.median(tried)), least))

@@ -1,8 +1,8 @@
-"""Whatever slides along a guide: its friction, springs and waves; their law, and the effects of
-them.
+"""Guide: friction, spring and cogging between a moving part and the frame, and their effects.
 
-Dry friction is set-valued: while nothing moves it bears any force up to the limits that
-`dry_limits` gives. `docs/theory.md` has the equations.
+Dry friction is set-valued: at rest it bears any force up to the limits that `dry_limits` returns.
+The law is Coulomb, Stribeck and viscous friction (Armstrong-Hélouvry, Dupont and Canudas de Wit,
+Automatica 30(7), 1994). `docs/theory.md` derives the equations.
 """
 
 from __future__ import annotations
@@ -30,25 +30,27 @@ from rigtwin.components.tyre import Tyre
 from rigtwin.numerics.arrays import Array
 
 ROUNDING = 1e-12
-"""m, within which a gap is taken up."""
+"""Distance within which a gap counts as taken up, m."""
 LEAST_FRICTION = 10.0
-"""N; on the suspension rig a change of friction is tried in shares of what there is, or of this."""
+"""Smallest unit of friction changes in a search on the suspension rig, N."""
 ONE_WAY = 0.05
-"""Share of the mean friction that its weaker direction has at least: no guide slides freely one way
-and rubs the other."""
+"""Smallest friction of the weaker direction, as a share of the mean. No guide slides freely one way
+and rubs the other way."""
 SLOWEST, SLOW = 0.01, 0.35
-"""Shares of the highest speed between which Stribeck friction must fade."""
+"""Bounds of the Stribeck velocity, as shares of the highest speed."""
 WAVES = 3.0
-"""Waves along the stroke that cogging has at least: fewer are a force that depends on the place."""
+"""Smallest number of cogging waves along the stroke. Fewer are a force that depends on position."""
 
 
 CONSTANT = ("coulomb", "stribeck_velocity", "stribeck_exponent")
-"""Parameters of friction that alone do not make it depend on the motion."""
+"""Parameters that do not by themselves make friction depend on the motion."""
 
 
 class Rail(NamedTuple):
-    """Friction of the rail guide, with true stiction. Its friction parameters are those of Motor
-    too."""
+    """Friction of the suspension rig's rail guide, with true stiction.
+
+    `Motor` has the same friction parameters. The law is that of `Guide`.
+    """
 
     coulomb: Annotated[float, Quantity("N", 0.0, 1000.0, "breakaway, thesis §6.1.3")] = 50.0
     viscous: Annotated[float, Quantity("Ns/m", 0.0, 1e4, NONE)] = 0.0
@@ -62,21 +64,27 @@ class Rail(NamedTuple):
 
 
 class Guide(NamedTuple):
-    """Whatever acts between the moving part and the frame: a guide's friction, a damper, a spring.
+    """Force between a moving part and the frame: friction, a damper, a spring.
 
-    force = viscous·v ± ½·viscous_asymmetry·|v|, through a lag `relaxation`, + drag·v·|v|
-    +
-    stiffness·x + offset + cogging·sin(2π·x/cogging_pitch + cogging_phase) + dry friction, which
-    is coulomb + load_coefficient·|load| +
-    stribeck·exp(−|v/stribeck_velocity|^stribeck_exponent), in positive direction ½·asymmetry more
-    and in negative less, and acts through a play of `backlash` and a spring of `compliance` in
-    series with it. All of it acts through a spring of `mount_compliance`.
+    With position x, velocity v and transmitted force F_t:
 
-    Where the motion is given, the load is the force that reaches the guide from the body and from
-    the guide's own spring. Where the motion follows from a force, it is the actuator's force
+        force        = F_viscous + drag·v·|v| + F_position + F_dry
+        F_viscous    = (viscous ± ½·viscous_asymmetry)·v, through a first-order lag `relaxation`
+        F_position   = stiffness·(x − x_rest) + offset
+                       + cogging·sin(2π·x/cogging_pitch + cogging_phase)
+        |F_dry|      ≤ coulomb + load_coefficient·|F_t|
+                       + stribeck·exp(−|v/stribeck_velocity|^stribeck_exponent) ± ½·asymmetry
+
+    The upper sign is for positive v. Dry friction acts through a backlash and a spring of
+    `compliance` in series. All of it acts through a spring of `mount_compliance` in series.
+    Units are those of a sliding joint; for a turning joint, read rad for m and Nm for N.
+
+    The transmitted force is what reaches the guide from the body and the guide's own spring where
+    the motion is given, and the actuator's force where the motion follows from a force
     (docs/theory.md, "Load friction").
     """
 
+    # Coulomb friction, viscous friction and spring: the MJCF has values for these.
     coulomb: Annotated[float, Quantity("N", 0.0, 1e7, MJCF)] = 0.0
     viscous: Annotated[float, Quantity("Ns/m", 0.0, 1e9, MJCF)] = 0.0
     stiffness: Annotated[float, Quantity("N/m", 0.0, 1e12, MJCF)] = 0.0
@@ -100,12 +108,9 @@ class Guide(NamedTuple):
 
 
 class Friction(NamedTuple):
-    """Dry friction as compiled code takes it.
+    """Dry friction as compiled code takes it; parameters as in `Guide`."""
 
-    changing: whether it depends on the motion; the rest as in Guide.
-    """
-
-    changing: bool
+    changing: bool  # Whether friction depends on the motion; otherwise it is `coulomb` alone.
     coulomb: float
     stribeck: float
     stribeck_velocity: float
@@ -115,46 +120,50 @@ class Friction(NamedTuple):
     backlash: float
 
 
-def friction(of: Rail | Motor | Guide) -> Friction:
-    """The dry friction of whatever slides."""
-    values = {name: float(getattr(of, name, 0.0)) for name in Friction._fields[1:]}
+def friction(component: Rail | Motor | Guide) -> Friction:
+    """Return the dry friction of a rail, motor or guide."""
+    values = {name: float(getattr(component, name, 0.0)) for name in Friction._fields[1:]}
     changing = any(v for name, v in values.items() if name not in CONSTANT)
     return Friction(changing, **values)
 
 
 def friction_size(dry: Friction, load: float) -> float:
-    """How large dry friction may be, N, under a typical load, N."""
+    """Return the largest dry friction, N, under a typical load, N."""
     size = dry.coulomb + abs(dry.stribeck) + 0.5 * abs(dry.asymmetry)
     return size + dry.load_coefficient * abs(load)
 
 
 def gap_at(position: float) -> Array:
-    """State of the backlash: where its element is, m; shape (1,)."""
+    """Return the state of a backlash: the position of its friction element, m, shape (1,)."""
     return np.array([position])
 
 
 @compilable
 def dry_limits(dry: Friction, velocity: float, load: float) -> tuple[float, float]:
-    """What dry friction can bear.
+    """Return the limits of dry friction.
+
+    F_max = coulomb + load_coefficient·|load| + stribeck·exp(−|v/v_s|^n) ± ½·asymmetry, not below 0.
 
     Parameters
     ----------
     dry
-        The friction's parameters.
+        Parameters of the friction.
     velocity
-        m/s, of the motion that it resists.
+        Velocity v of the motion that friction resists, m/s.
     load
-        Force that what slides transmits, N. The models differ in what they count as such a force
-        (docs/theory.md, "Load friction").
+        Force that the sliding part transmits, N. The models differ in what they
+        count as such a force (docs/theory.md, "Load friction").
 
     Returns
     -------
-    Greatest forces against positive and against negative motion, N.
+    tuple
+        Largest forces against positive and against negative motion, N.
     """
     size = dry.coulomb + dry.load_coefficient * abs(load)
     if dry.stribeck != 0.0:
         ratio = abs(velocity / dry.stribeck_velocity)
         exponent = dry.stribeck_exponent
+        # Gauss' curve is the usual case: a product is faster than a power.
         power = ratio * ratio if exponent == 2.0 else ratio**exponent
         size += dry.stribeck * math.exp(-power)
     return max(size + 0.5 * dry.asymmetry, 0.0), max(size - 0.5 * dry.asymmetry, 0.0)
@@ -164,63 +173,104 @@ def dry_limits(dry: Friction, velocity: float, load: float) -> tuple[float, floa
 def breakaway(
     dry: Friction, gap: Array, position: float, velocity: float, load: float
 ) -> tuple[float, float]:
-    """What dry friction can bear now, N: against positive and against negative motion.
+    """Return the limits of dry friction behind a backlash, and move its friction element.
 
-    Moves the backlash's element, whose friction is felt only where the gap is taken up, and only in
-    the direction that pushes it on.
+    Friction acts only where the gap is taken up, and only against motion that pushes the element.
+
+    Parameters
+    ----------
+    dry
+        Parameters of the friction.
+    gap
+        State of the backlash, m, shape (1,); changed in place.
+    position, velocity
+        Position and velocity of the motion, m and m/s.
+    load
+        Force that the sliding part transmits, N.
+
+    Returns
+    -------
+    tuple
+        Largest forces against positive and against negative motion, N.
     """
     forward, backward = dry_limits(dry, velocity, load)
     half = 0.5 * dry.backlash
     if half > 0.0:
-        apart = position - gap[0]
-        if apart >= half - ROUNDING:
+        displacement = position - gap[0]
+        if displacement >= half - ROUNDING:
             gap[0] = position - half
             return forward, 0.0
-        if apart <= ROUNDING - half:
+        if displacement <= ROUNDING - half:
             gap[0] = position + half
             return 0.0, backward
         return 0.0, 0.0
     return forward, backward
 
 
-def resists(of: Guide) -> bool:
-    """Whether friction resists the motion in both directions, in neither by next to nothing: that
-    is a force of one direction."""
+def resists(guide: Guide) -> bool:
+    """Return whether friction resists both directions by at least `ONE_WAY` of the mean.
+
+    Otherwise it is a force of one direction and not the friction of a guide.
+    """
     most = 2.0 * (1.0 - ONE_WAY)
-    if of.load_coefficient == 0.0 and abs(of.asymmetry) > most * (of.coulomb + abs(of.stribeck)):
+    dry = guide.coulomb + abs(guide.stribeck)
+    if guide.load_coefficient == 0.0 and abs(guide.asymmetry) > most * dry:
         return False
-    return abs(of.viscous_asymmetry) <= most * of.viscous
+    return abs(guide.viscous_asymmetry) <= most * guide.viscous
 
 
 @compilable
-def stretch(apart: float, half: float) -> float:
-    """How far the spring behind a play of 2·half is stretched."""
-    return apart - half if apart > half else (apart + half if apart < -half else 0.0)
+def stretch(distance: float, half: float) -> float:
+    """Return the stretch of the spring behind a backlash of 2·half, m."""
+    return distance - half if distance > half else (distance + half if distance < -half else 0.0)
 
 
 @compilable
 def slide(
-    apart: float, half: float, spring: float, forward: float, backward: float
+    distance: float, half: float, spring: float, forward: float, backward: float
 ) -> tuple[float, float]:
-    """(dry friction, how far the slider slid) for a distance between the joint and its slider."""
-    force = spring * stretch(apart, half)
+    """Return dry friction and slip of an elastic, perfectly plastic element behind a backlash.
+
+    F = clip(spring·stretch, −backward, forward). Where a limit is reached, the slider follows so
+    that the spring holds exactly that limit.
+
+    Parameters
+    ----------
+    distance
+        Distance from the slider to the joint, m.
+    half
+        Half the backlash, m.
+    spring
+        Stiffness in series with the friction, N/m.
+    forward, backward
+        Limits against positive and negative motion, N.
+
+    Returns
+    -------
+    tuple
+        Dry friction, N, and motion of the slider, m.
+    """
+    force = spring * stretch(distance, half)
     if force > forward:
-        return forward, apart - half - forward / spring
+        return forward, distance - half - forward / spring
     if force < -backward:
-        return -backward, apart + half + backward / spring
+        return -backward, distance + half + backward / spring
     return force, 0.0
 
 
 @compilable
 def damping(guide: Guide, velocity: float) -> float:
-    """Viscous friction's coefficient in the direction of a velocity, Ns/m."""
+    """Return the viscous coefficient in the direction of a velocity, m/s: Ns/m."""
     more = 0.5 * guide.viscous_asymmetry
     return guide.viscous + (more if velocity > 0.0 else -more)
 
 
 @compilable
 def position_force(guide: Guide, position: float, rest: float) -> float:
-    """The forces that depend on the position alone."""
+    """Return spring, constant force and cogging at a position, N.
+
+    F = stiffness·(x − rest) + offset + cogging·sin(2π·x/cogging_pitch + cogging_phase).
+    """
     force = guide.stiffness * (position - rest) + guide.offset
     if guide.cogging != 0.0:
         force += guide.cogging * math.sin(
@@ -229,32 +279,32 @@ def position_force(guide: Guide, position: float, rest: float) -> float:
     return force
 
 
-def _rig_friction(at: Context) -> tuple[float, float]:
-    """Coulomb friction there is, and a size to try changes of."""
-    there = float(getattr(at.plant, at.effect.group).coulomb)
-    return there, max(there, LEAST_FRICTION)
+def _rig_friction(context: Context) -> tuple[float, float]:
+    """Return the nominal Coulomb friction and the unit of its changes, N."""
+    nominal = float(getattr(context.plant, context.effect.group).coulomb)
+    return nominal, max(nominal, LEAST_FRICTION)
 
 
-def _rig_coulomb(at: Context) -> Starts:
-    there, base = _rig_friction(at)
-    values = [max(there + share * base, 0.0) for share in (-0.7, -0.3, 0.3, 1.0, 3.0)]
+def _rig_coulomb(context: Context) -> Starts:
+    nominal, base = _rig_friction(context)
+    values = [max(nominal + share * base, 0.0) for share in (-0.7, -0.3, 0.3, 1.0, 3.0)]
     return Starts.single(values, 0.03 * base)
 
 
-def _rig_stribeck(at: Context) -> Starts:
-    _, base = _rig_friction(at)
+def _rig_stribeck(context: Context) -> Starts:
+    _, base = _rig_friction(context)
     amplitudes = (-0.5 * base, 0.5 * base, 2.0 * base)
     starts = tuple(product(amplitudes, (0.003, 0.01, 0.03, 0.08), (1.4,)))
     return Starts(starts, (0.05 * base, 0.001, 0.1))
 
 
-def _rig_asymmetry(at: Context) -> Starts:
-    _, base = _rig_friction(at)
+def _rig_asymmetry(context: Context) -> Starts:
+    _, base = _rig_friction(context)
     return Starts.single((-base, -0.3 * base, 0.3 * base, base), 0.03 * base)
 
 
 def _rig_cogging(_: Context) -> Starts:
-    # Waves that fit a stroke of some 80 mm a different number of times.
+    # The number of waves along the rig's stroke of some 80 mm is spread evenly.
     pitches = 1.0 / np.linspace(1.0 / 0.1, 1.0 / 0.008, 20)
     return _waves(5.0, pitches.tolist(), (0.5, 1e-4, 0.05))
 
@@ -265,49 +315,52 @@ def _waves(
     steps: tuple[float, float, float],
     bounds: tuple[tuple[float, float], ...] | None = None,
 ) -> Starts:
+    # Sine and cosine of each wavelength: a linear combination gives any phase.
     starts = tuple((size, pitch, phase) for pitch in pitches for phase in (0.0, 0.5 * math.pi))
     return Starts(starts, steps, quadrature=True, bounds=bounds)
 
 
-def _stribeck(at: Context) -> Starts:
-    scales = at.scales
+def _stribeck(context: Context) -> Starts:
+    scales = context.scales
     amplitudes = [share * scales.force for share in (-0.3, 0.1, 0.4)]
     speeds = [share * scales.fastest for share in (0.02, 0.06, 0.2)]
-    # What does not fade well below the highest speed cannot be told from Coulomb and viscous.
+    # Friction that does not fade well below the highest speed is confounded with Coulomb and
+    # viscous friction.
     bounds = ((-1e7, 1e7), (SLOWEST * scales.fastest, SLOW * scales.fastest))
     steps = (0.005 * scales.force, 0.005 * scales.fastest)
     return Starts(tuple(product(amplitudes, speeds)), steps, bounds=bounds)
 
 
-def _cogging(at: Context) -> Starts:
-    force, stroke = at.scales.force, at.scales.stroke
-    # Waves that fit the stroke three to forty times: a longer one is no wave.
+def _cogging(context: Context) -> Starts:
+    force, stroke = context.scales.force, context.scales.stroke
+    # Wavelengths that fit the stroke three to forty times.
     pitches = 2.0 * stroke / np.geomspace(WAVES, 40.0, 24)
     bounds = ((0.0, 1e7), (0.02 * stroke, 2.0 * stroke / WAVES), (-6.3, 6.3))
     return _waves(0.03 * force, pitches.tolist(), (0.003 * force, 0.002 * stroke, 0.05), bounds)
 
 
-def late_starts(at: Context) -> Starts:
-    """Times of a few ticks, and of a share of the motion's own."""
-    scales = at.scales
+def late_starts(context: Context) -> Starts:
+    """Return starts of a lag or delay: a few ticks, and shares of the motion's own time."""
+    scales = context.scales
     times = {ticks * scales.period for ticks in (0.5, 2.0, 6.0)} | {
         share * scales.time for share in (0.012, 0.05, 0.15)
     }
     return Starts.single(sorted(times), min(0.001 * scales.time, 0.25 * scales.period))
 
 
-def late_or_early_starts(at: Context) -> Starts:
-    """The same, and their negatives: a force that acts later than it is recorded."""
-    late = late_starts(at)
+def late_or_early_starts(context: Context) -> Starts:
+    """Return starts of either sign: a negative lag is a force that acts later than recorded."""
+    late = late_starts(context)
     times = [time for (time,) in late.values]
     return Starts.single([*(-time for time in times[:3]), *times], late.steps[0])
 
 
-def _drag(at: Context) -> Starts:
-    unit, there = at.scales.force / at.scales.speed**2, at.nominal
-    values = [there + share * unit for share in (0.02, 0.05, 0.15, 0.4)]
-    # It takes energy away; a negative one stands for a nominal viscous friction that is too high.
-    return Starts(tuple((v,) for v in values), (0.005 * unit,), bounds=((min(there, 0.0), 1e9),))
+def _drag(context: Context) -> Starts:
+    unit, nominal = context.scales.force / context.scales.speed**2, context.nominal
+    values = [nominal + share * unit for share in (0.02, 0.05, 0.15, 0.4)]
+    # Drag takes energy away, so negative values are excluded: they would only compensate a nominal
+    # viscous friction that is too high.
+    return Starts(tuple((v,) for v in values), (0.005 * unit,), bounds=((min(nominal, 0.0), 1e9),))
 
 
 def _force(scales: Scales) -> float:
@@ -393,7 +446,7 @@ KINDS = (
         "stiffness at small deflection",
         {
             Tyre: shares_of_nominal((0.7, 0.85, 0.95, 1.05, 1.15, 1.4), 0.005),
-            # Densely: where little damps, only a stiffness near the right one looks any better.
+            # Dense starts: a lightly damped resonance fits better only close to its stiffness.
             Guide: around_nominal(
                 lambda s: s.force / s.stroke,
                 (-0.3, -0.05, *np.geomspace(0.02, 0.9, 10).tolist()),
@@ -446,4 +499,4 @@ KINDS = (
     ),
 )
 THROUGH_FRICTION = ("stribeck", "asymmetry", "backlash", "compliance")
-"""Kinds of a guide that change its dry friction, and do nothing without it."""
+"""Kinds of effect that change a guide's dry friction and have no effect without it."""

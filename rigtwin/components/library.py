@@ -1,6 +1,7 @@
-"""Every kind of effect there is, and the effects that a plant of given components can have.
+"""Library of all kinds of effect, and the effects that a plant can have.
 
-`setting@controller` is besides: any setting that is not what the operator wrote down.
+One effect is not listed here: `setting@controller`, a controller setting that differs from the
+operator's record.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ KINDS: tuple[Kind, ...] = tuple(
 
 
 def candidates(plant: Plant) -> Iterator[Effect]:
-    """All effects that a plant can have, component by component."""
+    """Yield all effects that a plant can have, component by component."""
     for group, component in plant._asdict().items():
         for kind in KINDS:
             if type(component) in kind.at:
@@ -29,36 +30,41 @@ def candidates(plant: Plant) -> Iterator[Effect]:
 
 
 def title(kind: str) -> str:
-    """What a kind of effect is called in a sentence."""
+    """Return the title of a kind of effect, or its name if it is unknown."""
     return next((each.title for each in KINDS if each.name == kind), kind)
 
 
 def find(name: str, plant: Plant) -> Effect:
-    """The effect of that name.
+    """Return an effect by its name.
 
     Parameters
     ----------
     name
-        `KIND@COMPONENT`, such as `coulomb@rail`.
+        Name `KIND@COMPONENT`, such as `coulomb@rail`.
     plant
-        The plant that is to have it.
+        Plant that gets the effect.
+
+    Returns
+    -------
+    Effect
+        Effect at that component.
 
     Raises
     ------
     RigtwinError
-        If it cannot have it; the message says what there is.
+        If the plant cannot have the effect; the message lists what is available.
     """
     effects = {effect.name: effect for effect in candidates(plant)}
     if name in effects:
         return effects[name]
     kind, _, component = name.partition("@")
-    there = [effect.kind.name for effect in effects.values() if effect.component == component]
-    meant = [each for each in effects if not there or each.endswith(f"@{component}")]
-    close = get_close_matches(name, meant, 1, 0.75)
+    available = [effect.kind.name for effect in effects.values() if effect.component == component]
+    spellings = [text for text in effects if not available or text.endswith(f"@{component}")]
+    close = get_close_matches(name, spellings, 1, 0.75)
     hint = f"did you mean {close[0]!r}? " if close else ""
-    if there:
+    if available:
         raise RigtwinError(
-            f"unknown effect {kind!r} at {component}; {hint}there are {', '.join(there)}"
+            f"unknown effect {kind!r} at {component}; {hint}there are {', '.join(available)}"
         )
     known = ", ".join(dict.fromkeys(effect.component for effect in effects.values()))
     raise RigtwinError(

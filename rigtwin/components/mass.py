@@ -1,4 +1,4 @@
-"""What moves: its mass, and where a search for another one starts."""
+"""Mass of a moving part, m in F = m·x'', and the effect of another mass."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from rigtwin.components.quantity import MJCF, Quantity
 
 
 class Carriage(NamedTuple):
-    """Rail-guided carriage with wheel and tyre."""
+    """Carriage of the suspension rig on its rail, with wheel and tyre."""
 
     mass: Annotated[float, Quantity("kg", 1.0, 1e4, "34 kg with wheel and tyre; thesis ch. 3")] = (
         34.0
@@ -17,7 +17,10 @@ class Carriage(NamedTuple):
 
 
 class Mass(NamedTuple):
-    """What moves."""
+    """Mass, or moment of inertia, that moves with one joint of a described machine.
+
+    Units are those of a sliding joint; for a turning joint, read kg m² for kg.
+    """
 
     mass: Annotated[float, Quantity("kg", 0.0, 1e6, MJCF)] = 0.0
 
@@ -30,6 +33,7 @@ KINDS = (
         "mass",
         {
             Carriage: shares_of_nominal((0.85, 0.95, 1.05, 1.15, 1.4), 0.005),
+            # F / a is the whole inertia that a measured force could move: a start without nominal.
             Mass: shares_of_size(
                 lambda s: s.force / s.acceleration, (0.7, 0.9, 0.97, 1.03, 1.1, 1.4), 0.005
             ),

@@ -1,9 +1,13 @@
-"""What a guide is mounted on: a spring in series with everything the guide does.
+"""Compliant mount of a guide: a spring in series with all forces of the guide.
 
-Behind a yielding mount the guide moves less than what is measured. All that resists is monotonic in
-the guide's own position but for waves (cogging), so its equilibrium with the spring is one number,
-found case by case and then between bounds. Waves that are steeper than the mount is stiff,
-2π·cogging·mount_compliance > cogging_pitch, have several equilibria; one of them is returned.
+Behind the mount, the guide's own position p differs from the measured position x:
+
+    x = p + c·f(p),   with the mount's compliance c and the guide's force f(p)
+
+The force is monotonic in p but for cogging, so the equilibrium is unique. It is computed case by
+case for piecewise linear friction, and refined by a bracketed secant search otherwise. Cogging that
+is steeper than the mount is stiff, 2π·cogging·mount_compliance > cogging_pitch, has several
+equilibria; one of them is returned.
 """
 
 from __future__ import annotations
@@ -13,9 +17,10 @@ from rigtwin.components.effect import Kind, around_nominal
 from rigtwin.components.guide import Friction, Guide, damping, dry_limits, position_force, slide
 
 MOST = 60
-"""Steps of the search for an equilibrium; where only dry friction is nonlinear it needs none."""
+"""Largest number of search steps. None is needed where only dry friction is nonlinear."""
 CLOSE, ROUNDED = 1e-9, 4e-16
-"""Share of the distance to the equilibrium, and of the place, at which it is found."""
+"""Tolerance of the equilibrium, as a share of the guide's motion in the step and as a share of the
+position (rounding)."""
 
 
 @compilable
@@ -31,30 +36,31 @@ def resist_at(
     limits: tuple[float, float],
     position: float,
 ) -> tuple[float, float, float]:
-    """What a guide resists with if it is at a position after this step.
+    """Return the force f(p) of a guide at a position p after a step.
 
     Parameters
     ----------
     guide
-        Its parameters.
+        Parameters of the guide.
     spring
-        In series with the dry friction, N/m.
+        Stiffness in series with the dry friction, N/m.
     rest
-        Where the guide's own spring is slack, m.
+        Position at which the guide's own spring is slack, m.
     share
-        Of the way that viscous friction relaxes in a step.
+        Share by which viscous friction relaxes in a step.
     period
-        s, of a step.
+        Length of the step, s.
     inner, slider, viscous
-        Its position m, its slider's m and its viscous force N before the step.
+        Position of the guide, m, of its friction element, m, and viscous force, N, before the step.
     limits
-        What dry friction can bear, N.
+        Limits of the dry friction against positive and negative motion, N.
     position
-        m.
+        Position p of the guide after the step, m.
 
     Returns
     -------
-    Force N, how far the slider slides m, and the viscous force N.
+    tuple
+        Force, N, motion of the friction element, m, and viscous force, N.
     """
     v = (position - inner) / period
     dry, by = slide(position - slider, 0.5 * guide.backlash, spring, limits[0], limits[1])
@@ -78,25 +84,29 @@ def give_way(
     load: float,
     outer: float,
 ) -> tuple[float, float, float, float]:
-    """The guide behind its mount, whose other end is moved to a position.
+    """Move a guide behind its mount, whose other end is at a given position.
 
     Parameters
     ----------
     guide, spring, rest, share, period, inner, slider, viscous
-        As of `resist_at`.
+        Guide and its state, as in `resist_at`.
     dry_friction
-        Of the guide.
+        Dry friction of the guide.
     speed
-        m/s, of the guide in the step before; it decides what dry friction can bear.
+        Velocity of the guide in the step before, m/s; it sets the limits of dry friction.
     load
-        N, what else the guide transmits.
+        Force that the guide transmits in addition, N.
     outer
-        m, where the mount's other end is.
+        Position x of the mount's other end, m.
 
     Returns
     -------
-    The guide's position m, its slider's m, its viscous force N, and the force on the mount N.
+    tuple
+        Position of the guide, m, of its friction element, m, viscous force, N, and force on the
+        mount, N.
     """
+    # One function on purpose: it runs in every step, and its search would pass all of its dozen
+    # arguments on to a part of its own.
     limits = dry_limits(dry_friction, speed, load)
     compliance = guide.mount_compliance
     position, slope = guess_position(
@@ -125,8 +135,8 @@ def give_way(
         position=position,
     )
     error = position + compliance * force - outer
-    # What resists grows with the position, so the guide is no further off than the error is large.
-    # Only waves may fall while the position grows, by twice their amplitude at most.
+    # The mismatch p + c·f(p) − x has a slope of at least 1, so the equilibrium is no further away
+    # than the mismatch itself. Only cogging may fall with p, by twice its amplitude at most.
     waves = 2.0 * compliance * guide.cogging
     low, high = min(position, position - error) - waves, max(position, position - error) + waves
     enough = CLOSE * abs(outer - inner) + ROUNDED * abs(outer)
@@ -138,6 +148,7 @@ def give_way(
             high = position
         else:
             low = position
+        # Secant step, or bisection where it leaves the bracket.
         following = position - error / slope
         if halve or not low < following < high:
             following = 0.5 * (low + high)
@@ -175,17 +186,20 @@ def guess_position(
     limits: tuple[float, float],
     outer: float,
 ) -> tuple[float, float]:
-    """Where the guide is in equilibrium with its mount if nothing but its dry friction is
-    nonlinear: case by case. Arguments as of `give_way`.
+    """Return the equilibrium of guide and mount if only dry friction is nonlinear.
+
+    Four cases are tried: the friction element slides forward, slides backward, lies within its
+    backlash, or sticks with its spring stretched. Arguments are those of `give_way`.
 
     Returns
     -------
-    Position m, and how fast the mismatch with the mount grows with it.
+    tuple
+        Position of the guide, m, and slope of the mismatch p + c·f(p) − x in p.
     """
     compliance, half = guide.mount_compliance, 0.5 * guide.backlash
     along = share * damping(guide, speed) / period
     rate = along + guide.stiffness
-    # All that resists but dry friction is `least` + rate·position.
+    # Force without dry friction, linear in the position: least + rate·position.
     least = position_force(guide, inner, rest) + (1.0 - share) * viscous - rate * inner
     slope = 1.0 + compliance * rate
     up = (outer - compliance * (least + limits[0])) / slope

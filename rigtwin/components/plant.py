@@ -1,4 +1,4 @@
-"""The plant: all components of a machine by name, a NamedTuple of their parameters."""
+"""Plant: the parameters of all components of a machine, by name, in a NamedTuple."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ if TYPE_CHECKING:
 
 
 class Plant(Protocol):
-    """Components by name: any NamedTuple of components that has a `computer` and the `mains`.
+    """Protocol of a plant: a NamedTuple of components, among them `computer` and `mains`.
 
-    Which others there are follows from a machine's description. A component is itself a NamedTuple
-    whose fields carry `Quantity(unit, low, high, source)`.
+    The machine's description decides which other components it has. A component is itself a
+    NamedTuple whose fields carry `Quantity(unit, low, high, source)`.
     """
 
     @property
@@ -35,12 +35,13 @@ P = TypeVar("P", bound=Plant)
 
 
 def plant_of(components: Mapping[str, Any]) -> Any:
-    """A plant of components by name, which other processes can be given."""
-    made = namedtuple("Plant", list(components))  # type: ignore[misc]
-    made.__reduce__ = lambda plant: (plant_of, (plant._asdict(),))  # type: ignore[method-assign, assignment]
-    return made(**components)
+    """Return a plant of these components, by name; it can be pickled."""
+    # The class is made at run time, so a process that unpickles a plant has to make it again.
+    plant_type = namedtuple("Plant", list(components))  # type: ignore[misc]
+    plant_type.__reduce__ = lambda plant: (plant_of, (plant._asdict(),))  # type: ignore[method-assign, assignment]
+    return plant_type(**components)
 
 
 def with_parameters(plant: P, group: str, changes: Mapping[str, float]) -> P:
-    """The plant with other values of one component's parameters."""
+    """Return a plant with changed parameters of one component, named `group`."""
     return plant._replace(**{group: getattr(plant, group)._replace(**changes)})

@@ -1,16 +1,15 @@
-"""What every component's parameters share: their meaning, and the words for a value that is not
-there."""
+"""Meaning of a component's parameters: unit, bounds and source, and the sources that all share."""
 
 from __future__ import annotations
 
 from controllers.quantity import Choice, Quantity, fields
 
 UNLIMITED = 1e9
-"""Of a limit: so high that it is never reached."""
+"""Value of a limit that is never reached. Finite, so that compiled code can calculate with it."""
 NONE = "none in the nominal machine"
 """Source of a neutral value."""
 MJCF = "the MJCF, unless the description says otherwise"
-"""Source of what a described machine's model says."""
+"""Source of a value that a described machine takes from its MJCF."""
 
 
 STRIBECK_EXPONENT = Quantity(
@@ -19,6 +18,6 @@ STRIBECK_EXPONENT = Quantity(
     3.0,
     "2: Gauss' curve; 0.5 to 2 are used, Armstrong-Hélouvry et al., Automatica 30(7), 1994",
 )
-"""Shared by all that slide."""
+"""Exponent of the Stribeck curve, a parameter of motor, rail and guide."""
 
 __all__ = ["MJCF", "NONE", "STRIBECK_EXPONENT", "UNLIMITED", "Choice", "Quantity", "fields"]

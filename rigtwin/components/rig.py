@@ -1,5 +1,4 @@
-"""The plant of the hybrid suspension rig: a quarter car between two hydraulic cylinders; by default
-the nominal one."""
+"""Plant of the hybrid suspension rig: a quarter car between two hydraulic cylinders."""
 
 from __future__ import annotations
 
@@ -16,8 +15,9 @@ from rigtwin.components.tyre import Tyre
 
 
 class RigPlant(NamedTuple):
-    """The whole rig; by default the nominal one."""
+    """Parameters of the whole suspension rig; the defaults are the nominal rig."""
 
+    # Mechanics.
     carriage: Carriage = Carriage()
     rail: Rail = Rail()
     tyre: Tyre = Tyre()
@@ -25,6 +25,7 @@ class RigPlant(NamedTuple):
     gas_spring: GasSpring = GasSpring()
     ground_cylinder: Cylinder = Cylinder()
     structure_cylinder: Cylinder = Cylinder()
+    # Sensors, computer and mains.
     ground_lvdt: Lvdt = Lvdt()
     structure_lvdt: Lvdt = Lvdt()
     suspension_lvdt: Lvdt = Lvdt()

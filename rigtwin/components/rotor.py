@@ -1,4 +1,8 @@
-"""What turns with a joint behind its gear, or with a coupling of joints: a motor's rotor."""
+"""Rotor of a motor behind its gear: inertia without weight at a joint or a coupling of joints.
+
+The force is F = inertia·x'' along the joint or coupling, with inertia = J_rotor·ratio² (the
+armature of MuJoCo).
+"""
 
 from __future__ import annotations
 
@@ -9,8 +13,12 @@ from rigtwin.components.quantity import MJCF, Quantity
 
 
 class Rotor(NamedTuple):
-    """A motor's rotor and its gear, at the joint. inertia: times the gear's ratio squared; it has
-    no weight and takes no part in the other joints' motion."""
+    """Rotor with its gear, seen from the joint.
+
+    Its inertia is that of the rotor times the square of the gear ratio. Gravity does not act on it,
+    and the motion of other joints does not accelerate it. Units are those of a sliding joint; for a
+    turning joint, read kg m² for kg.
+    """
 
     inertia: Annotated[float, Quantity("kg", 0.0, 1e6, MJCF)] = 0.0
 

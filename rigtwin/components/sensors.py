@@ -1,5 +1,8 @@
-"""Sensors: their parameters, and what each makes of the quantity that it measures, noise and
-quantisation apart."""
+"""Sensors: parameters, and the law from the true quantity to the reading.
+
+y(t) = gain·x_lag(t − delay) + offset + drift·t, where x_lag is the quantity behind a first-order
+lag. Noise, hum and quantisation come on top (`simulation.converters`, `models.reading`).
+"""
 
 from __future__ import annotations
 
@@ -16,14 +19,15 @@ from rigtwin.numerics.compiling import kernel
 from rigtwin.numerics.delay import delay_sample, ring
 
 INVERTIBLE = 80.0
-"""Hz, up to which a sensor's lag is undone."""
+"""Highest frequency at which a sensor's lag is inverted, Hz."""
 PADDED = 50
-"""Samples that a zero-phase filter needs."""
+"""Smallest number of samples for the zero-phase filter."""
 
 
 class Lvdt(NamedTuple):
-    """Position sensor as the DAQ reads it."""
+    """Position sensor (LVDT) of the suspension rig, as the data acquisition reads it."""
 
+    # White noise, mains hum and resolution of the converter; then the static and dynamic errors.
     white: Annotated[float, Quantity("m", 0.0, 0.01, "rms, thesis §3.4 (±5e-4 m in all)")] = 6e-5
     hum: Annotated[float, Quantity("m", 0.0, 0.01, "amplitude of the mains line, thesis §3.4")] = (
         2e-4
@@ -37,8 +41,9 @@ class Lvdt(NamedTuple):
 
 
 class LoadCell(NamedTuple):
-    """Force sensor Interface 1010AF between motor rod and plate, as the DAQ reads it."""
+    """Force sensor Interface 1010AF between motor rod and plate, read by the data acquisition."""
 
+    # White noise, mains hum and resolution of the converter; then the static and dynamic errors.
     white: Annotated[float, Quantity("N", 0.0, 500.0, "rms, thesis §3.4 (±12 N in all)")] = 1.5
     hum: Annotated[float, Quantity("N", 0.0, 500.0, "amplitude of the mains line, thesis §3.4")] = (
         5.0
@@ -52,7 +57,7 @@ class LoadCell(NamedTuple):
 
 
 class PositionSensor(NamedTuple):
-    """Position as the recording has it."""
+    """Sensor of a joint's position; for a turning joint, read rad for m."""
 
     gain: Annotated[float, Quantity("1", 0.05, 5.0, "1: calibrated")] = 1.0
     offset: Annotated[float, Quantity("m", -100.0, 100.0, "0: calibrated")] = 0.0
@@ -65,7 +70,7 @@ class PositionSensor(NamedTuple):
 
 
 class VelocitySensor(NamedTuple):
-    """Velocity as the recording has it."""
+    """Sensor of a joint's velocity; for a turning joint, read rad for m."""
 
     gain: Annotated[float, Quantity("1", 0.05, 5.0, "1: calibrated")] = 1.0
     offset: Annotated[float, Quantity("m/s", -100.0, 100.0, "0: calibrated")] = 0.0
@@ -78,10 +83,10 @@ class VelocitySensor(NamedTuple):
 
 
 class ForceSensor(NamedTuple):
-    """Force that moves the joint, positive where it moves it on, as the recording has it.
+    """Sensor of the force on a joint, positive in the joint's positive direction.
 
-    A negative lag or delay means that the force acts later than it is recorded: what is recorded is
-    the command of an actuator, which follows it late.
+    A negative lag or delay means that the force acts later than it is recorded, as where the
+    recording holds the command of an actuator that follows it late.
     """
 
     gain: Annotated[float, Quantity("1", 0.05, 5.0, "1: calibrated")] = 1.0
@@ -95,7 +100,7 @@ class ForceSensor(NamedTuple):
 
 
 DECLARED = (Lvdt, LoadCell)
-"""Sensors whose noise, hum and bits are declared."""
+"""Types of sensors whose noise, hum and resolution are declared."""
 Sensor = Lvdt | LoadCell | PositionSensor | VelocitySensor | ForceSensor
 MEASURES: Mapping[type, str] = {
     PositionSensor: "position",
@@ -104,51 +109,53 @@ MEASURES: Mapping[type, str] = {
     Lvdt: "position",
     LoadCell: "force",
 }
-"""Type of sensor → what it measures of its joint."""
+"""Type of sensor → quantity that it measures."""
 
 
 def measures(component: object) -> str:
-    """What a component measures: position, velocity or force; "" if it is no sensor."""
+    """Return the quantity that a component measures: position, velocity or force.
+
+    It is "" for a component that is not a sensor.
+    """
     return MEASURES.get(type(component), "")
 
 
 class Transducer(NamedTuple):
-    """What a sensor makes of its quantity. drift: a tick; delay: in ticks; share: of the way to its
-    input that the lag goes in a tick."""
+    """Law of a sensor as compiled code takes it, for one tick."""
 
-    neutral: bool
-    gain: float
-    offset: float
-    drift: float
-    delay: float
-    share: float
+    neutral: bool  # Whether the reading is the true quantity.
+    gain: float  # Gain of the reading.
+    offset: float  # Offset of the reading.
+    drift: float  # Drift of the reading per tick.
+    delay: float  # Delay in ticks.
+    share: float  # Share of the remaining distance that the lag covers in a tick.
 
 
 class TransducerState(NamedTuple):
-    """history: past values, a ring; memory: where the ring stands (−1 before the first tick), the
-    lag's output, how far the zero has drifted."""
+    """State of a sensor; changed in place."""
 
-    history: Array
-    memory: Array
+    history: Array  # Past values, a ring buffer.
+    memory: Array  # Position in the ring (−1 before the first tick), lag's output, drift so far.
 
 
 def transducer(sensor: Sensor, period: float) -> Transducer:
+    """Return the law of a sensor, discretised for ticks of a period, s."""
     drift = sensor.drift * period
-    own = sensor.gain, sensor.offset, sensor.delay, sensor.lag, drift
-    neutral = own == (1.0, 0.0, 0.0, 0.0, 0.0)
-    # A sensor that runs tick by tick cannot know what comes: see `apply_sensor` for a lead.
+    parameters = sensor.gain, sensor.offset, sensor.delay, sensor.lag, drift
+    neutral = parameters == (1.0, 0.0, 0.0, 0.0, 0.0)
+    # Tick by tick, a negative lag or delay would need future values: only `apply_sensor` has them.
     lag, delay = max(sensor.lag, 0.0), max(sensor.delay, 0.0)
     share = 1.0 if lag == 0.0 else 1.0 - math.exp(-period / lag)
     return Transducer(neutral, sensor.gain, sensor.offset, drift, delay / period, share)
 
 
 def start_transducer(sensor: Transducer) -> TransducerState:
-    """Before the first sample."""
+    """Return the state of a sensor before its first sample."""
     return TransducerState(ring(sensor.delay, 0.0), np.array([-1.0, 0.0, 0.0]))
 
 
 def remove_drift(sensor: Sensor, measured: Array, period: float) -> Array:
-    """What a sensor reads, shape (ticks,), as if its zero had stayed where it was at the start."""
+    """Return a reading without its drift, shape (ticks,)."""
     if sensor.drift == 0.0:
         return measured
     return measured - sensor.drift * period * np.arange(len(measured))
@@ -156,27 +163,54 @@ def remove_drift(sensor: Sensor, measured: Array, period: float) -> Array:
 
 @compilable
 def transduce(sensor: Transducer, state: TransducerState, value: float) -> float:
-    """The sensor's output at this tick. Before the first tick the quantity was what it is then."""
+    """Return the reading of a sensor at this tick and advance its state.
+
+    Parameters
+    ----------
+    sensor
+        Law of the sensor.
+    state
+        State of the sensor, changed in place.
+    value
+        True quantity at this tick.
+    """
     if sensor.neutral:
         return value
+    # Before the first tick, the quantity is taken to have had its first value for long.
     if state.memory[0] < 0.0:
         state.history[:] = value
         state.memory[0], state.memory[1] = 0.0, value
     late = delay_sample(state.history, state.memory, sensor.delay, value)
     state.memory[1] += sensor.share * (late - state.memory[1])
-    found = sensor.gain * state.memory[1] + sensor.offset + state.memory[2]
+    reading = sensor.gain * state.memory[1] + sensor.offset + state.memory[2]
     state.memory[2] += sensor.drift
-    return found
+    return reading
 
 
 @kernel
 def _transduce_all(sensor: Transducer, state: TransducerState, true: Array, out: Array) -> None:
+    """Write the readings of a signal, shape (ticks,), to `out`."""
     for tick in range(len(true)):
         out[tick] = transduce(sensor, state, true[tick])
 
 
 def apply_sensor(sensor: Sensor, true: Array, period: float) -> Array:
-    """What a sensor makes of a signal, shape (ticks,), noise and quantisation apart."""
+    """Return a sensor's readings of a signal, without noise and quantisation.
+
+    Parameters
+    ----------
+    sensor
+        Sensor with its parameters.
+    true
+        True quantity, shape (ticks,).
+    period
+        Time from tick to tick, s.
+
+    Returns
+    -------
+    array
+        Readings, shape (ticks,).
+    """
     model, out = transducer(sensor, period), np.empty(len(true))
     if model.neutral:
         return true.copy()
@@ -186,13 +220,14 @@ def apply_sensor(sensor: Sensor, true: Array, period: float) -> Array:
 
 
 def _lead(lag: float, delay: float, signal: Array, period: float) -> Array:
-    """Undo a lag, s, and a delay, s, of a signal, shape (ticks,).
+    """Advance a signal by the inverse of a lag and a delay, s, shape (ticks,).
 
-    The lag's inverse is limited to 80 Hz, or it would make much of the noise.
+    A lag T is inverted by x = y + T·y'. The derivative is low-passed at `INVERTIBLE` without phase
+    shift, or it would amplify the noise.
     """
     ahead = signal
     if lag > 0.0 and len(signal) > PADDED:
-        # Loading it takes a second, which most runs need not wait for.
+        # Imported late: scipy is slow to load, and most runs do not need it.
         from scipy.signal import butter, sosfiltfilt
 
         low_pass = butter(2, min(INVERTIBLE, 0.4 / period), fs=1.0 / period, output="sos")
@@ -204,6 +239,22 @@ def _lead(lag: float, delay: float, signal: Array, period: float) -> Array:
 
 
 def undo_sensor(sensor: Sensor, signal: Array, period: float) -> Array:
-    """The change of a true quantity behind a change of a sensor's output: its gain, lag and delay
-    undone, not its offset."""
+    """Return the change of the true quantity behind a change of a sensor's reading.
+
+    Gain, lag and delay are inverted. Offset and drift cancel in a change.
+
+    Parameters
+    ----------
+    sensor
+        Sensor with its parameters.
+    signal
+        Change of the reading, shape (ticks,).
+    period
+        Time from tick to tick, s.
+
+    Returns
+    -------
+    array
+        Change of the true quantity, shape (ticks,).
+    """
     return _lead(max(sensor.lag, 0.0), max(sensor.delay, 0.0), signal, period) / sensor.gain

@@ -1,8 +1,10 @@
-"""A servo: a controller of a position that sits in its actuator. Parameters, law, kinds of effect.
-Units are those of a joint that slides; of one that turns, read rad for m and Nm for N.
+"""Servo: an actuator with a position controller of its own.
 
-force = position_gain · (command − position) − damping_gain · speed, within ±force_limit: MuJoCo's
-`position` actuator with `kp`, `kv` and `forcerange` (MuJoCo, XML reference, actuator/position).
+    force = clip(position_gain·(command − position) − damping_gain·speed, ±force_limit)
+
+This is MuJoCo's `position` actuator with `kp`, `kv` and `forcerange` (MuJoCo, XML reference,
+actuator/position). Units are those of a sliding joint; for a turning joint, read rad for m and Nm
+for N.
 """
 
 from __future__ import annotations
@@ -21,14 +23,19 @@ from rigtwin.numerics.compiling import kernel
 
 
 class Servo(NamedTuple):
-    """Command of a position to force: limits of the command, delay, gain, rate limit, lag, then
-    the law. Within the deadband of the position's error it does not push."""
+    """Actuator that controls a position by a force.
 
+    Order of operations: limits of the command, delay, gain, rate limit, lag, then the law. Within
+    the deadband of the position error it exerts no position force.
+    """
+
+    # Law of the servo, by the MJCF.
     position_gain: Annotated[float, Quantity("N/m", 1e-9, 1e12, MJCF)] = 1.0
     damping_gain: Annotated[float, Quantity("Ns/m", 0.0, 1e12, MJCF)] = 0.0
     force_limit: Annotated[float, Quantity("N", 1e-9, UNLIMITED, MJCF)] = UNLIMITED
     command_low: Annotated[float, Quantity("m", -UNLIMITED, UNLIMITED, MJCF)] = -UNLIMITED
     command_high: Annotated[float, Quantity("m", -UNLIMITED, UNLIMITED, MJCF)] = UNLIMITED
+    # Conditioning of the command; neutral in the nominal machine.
     gain: Annotated[float, Quantity("1", 0.05, 5.0, "1: as specified")] = 1.0
     lag: Annotated[float, Quantity("s", 0.0, 10.0, NONE)] = 0.0
     delay: Annotated[float, Quantity("s", 0.0, 1.0, NONE)] = 0.0
@@ -38,53 +45,57 @@ class Servo(NamedTuple):
 
 Pusher = ForceActuator | Servo
 PUSHERS = (ForceActuator, Servo)
-"""Types of actuators that push a joint; where it goes follows from that."""
+"""Types of actuators that exert a force on a joint, whose motion follows from it."""
 
 
 class Push(NamedTuple):
-    """What pushes a joint: constant, N per unit of the command; position_gain N/m and damping_gain
-    Ns/m, of a servo; band, N that are kept back by its deadband; limit, N."""
+    """Law of a force actuator or servo as compiled code takes it."""
 
-    constant: float
-    position_gain: float
-    damping_gain: float
-    band: float
-    limit: float
+    constant: float  # Force per unit of the command, N per unit.
+    position_gain: float  # Position gain of a servo, N/m; 0 for a force actuator.
+    damping_gain: float  # Damping gain of a servo, Ns/m.
+    band: float  # Force within a servo's deadband, N.
+    limit: float  # Largest force, N.
 
 
-def push_law(of: Pusher) -> Push:
-    """The law of a force actuator or a servo."""
-    limit = min(of.force_limit, UNLIMITED)
-    if isinstance(of, Servo):
-        kept = of.position_gain * of.deadband
-        return Push(of.position_gain, of.position_gain, of.damping_gain, kept, limit)
-    return Push(of.constant, 0.0, 0.0, 0.0, limit)
+def push_law(actuator: Pusher) -> Push:
+    """Return the law of a force actuator or a servo."""
+    limit = min(actuator.force_limit, UNLIMITED)
+    if isinstance(actuator, Servo):
+        band = actuator.position_gain * actuator.deadband
+        return Push(
+            actuator.position_gain, actuator.position_gain, actuator.damping_gain, band, limit
+        )
+    return Push(actuator.constant, 0.0, 0.0, 0.0, limit)
 
 
 @compilable
 def pull(law: Push, command: float, position: float) -> float:
-    """A servo's force, its damping and its limit apart."""
+    """Return a servo's position force, N, without damping and limit.
+
+    It is position_gain·(command − position), shrunk towards zero by the deadband.
+    """
     force = law.position_gain * (command - position)
     return math.copysign(max(abs(force) - law.band, 0.0), force)
 
 
 @compilable
 def push(law: Push, command: float, position: float, speed: float) -> float:
-    """The force of what pushes.
+    """Return the force of a force actuator or a servo.
 
     Parameters
     ----------
     law
-        Of a force actuator or a servo.
+        Law of the actuator.
     command
-        In its unit, as conditioned.
+        Conditioned command, in its unit.
     position, speed
-        Of the joint, m and m/s.
+        Position and velocity of the joint, m and m/s.
 
     Returns
     -------
     float
-        N.
+        Force, N.
     """
     force = law.constant * command
     if law.position_gain > 0.0:
@@ -94,21 +105,21 @@ def push(law: Push, command: float, position: float, speed: float) -> float:
 
 @kernel
 def push_all(law: Push, commands: Array, positions: Array, speeds: Array) -> Array:
-    """The same from tick to tick, each shape (ticks,)."""
+    """Return the forces at all ticks, N; arguments as in `push`, shape (ticks,) each."""
     forces = np.empty(len(commands))
     for tick in range(len(commands)):
         forces[tick] = push(law, commands[tick], positions[tick], speeds[tick])
     return forces
 
 
-def _damping_gain(at: Context) -> Starts:
-    unit = at.nominal if at.nominal > 0.0 else at.scales.force / at.scales.speed
-    shares = (0.0, 0.5, 2.0, 4.0) if at.nominal > 0.0 else (0.03, 0.1, 0.3, 1.0)
+def _damping_gain(context: Context) -> Starts:
+    unit = context.nominal if context.nominal > 0.0 else context.scales.force / context.scales.speed
+    shares = (0.0, 0.5, 2.0, 4.0) if context.nominal > 0.0 else (0.03, 0.1, 0.3, 1.0)
     return Starts.single([share * unit for share in shares], 0.004 * unit)
 
 
-def _force_limit(at: Context) -> Starts:
-    size = min(at.scales.force, at.nominal)
+def _force_limit(context: Context) -> Starts:
+    size = min(context.scales.force, context.nominal)
     return Starts.single([share * size for share in (2.5, 1.7, 1.2, 0.8, 0.5)], 0.004 * size)
 
 

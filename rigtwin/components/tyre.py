@@ -1,4 +1,4 @@
-"""A tyre: a compliant contact that only pushes, whose stiffness may grow with its deflection."""
+"""Tyre: a compliant contact that only pushes, and whose stiffness may grow with its deflection."""
 
 from __future__ import annotations
 
@@ -12,12 +12,14 @@ from rigtwin.components.quantity import NONE, Quantity
 from rigtwin.numerics.arrays import Array
 
 SCALE = 0.01
-"""m; at this deflection a tyre hardens as much whatever the power of its law."""
+"""Deflection at which the hardening is the same for all powers, m."""
 
 
 class Tyre(NamedTuple):
-    """Tyre: a compliant contact that only pushes, stiffness·δ·(1 + hardening·δ·(δ/10 mm)^(power −
-    1)) + damping·dδ/dt."""
+    """Tyre with the deflection δ > 0:
+
+    F = stiffness·δ·(1 + hardening·δ·(δ/10 mm)^(hardening_power − 1)) + damping·dδ/dt, not below 0.
+    """
 
     stiffness: Annotated[
         float, Quantity("N/m", 1e3, 1e7, "best match of the tests, thesis §6.3")
@@ -32,21 +34,23 @@ class Tyre(NamedTuple):
 
 
 def tyre_force(tyre: Tyre, deflection: Array, rate: Array) -> Array:
-    """What the tyre pushes with; it cannot pull.
+    """Return the force of a tyre; it cannot pull.
 
     Parameters
     ----------
     tyre
-        Its parameters.
+        Parameters of the tyre.
     deflection, rate
-        m and m/s, shape (n,).
+        Deflection and its rate, m and m/s, shape (n,).
 
     Returns
     -------
-    Force in N, shape (n,).
+    array
+        Force, N, shape (n,).
     """
     squeezed = np.maximum(deflection, 0.0)
     hardening = tyre.hardening * squeezed * (squeezed / SCALE) ** (tyre.hardening_power - 1.0)
+    # A softening tyre (negative hardening) must not turn into one that pulls.
     slope = np.maximum(1.0 + hardening, 0.0)
     damping = np.where(deflection > 0.0, tyre.damping * rate, 0.0)
     return np.maximum(tyre.stiffness * slope * squeezed + damping, 0.0)

@@ -1,9 +1,8 @@
-"""A plate that yields to its load: its displacement follows compliance·load at once, or through a
-lag of first order.
+"""Plate that yields to its load: T·y' + y = c·(load − z), by compliance c, lag T and zero load z.
 
-Load and displacement depend on each other within one timestep: a plate that gives way slides
-against the rod, and which way it slides decides the friction that it is loaded with. Both are
-solved together, so that a cylinder of any compliance stays stable at any timestep.
+Load and displacement depend on each other within a timestep. A plate that yields slides against the
+motor's rod, and the direction of sliding decides the friction that loads it. Both are solved
+together, so that a cylinder of any compliance is stable at any timestep.
 """
 
 from __future__ import annotations
@@ -15,47 +14,50 @@ from rigtwin.numerics.arrays import Array
 
 
 def yield_to_load(cylinder: Cylinder, load: Array, period: float) -> Array:
-    """Compute how far a plate yields to a load that is known.
+    """Compute how far a plate yields to a known load.
 
     Parameters
     ----------
     cylinder
-        Its compliance c, lag and zero load z: the displacement follows c·(load − z).
+        Cylinder with its compliance, lag and zero load.
     load
-        Load in N, shape (ticks,).
+        Load, N, shape (ticks,).
     period
-        Time between ticks in s.
+        Time from tick to tick, s.
 
     Returns
     -------
     array
-        Displacement in m, shape (ticks,).
+        Displacement, m, shape (ticks,).
     """
+    # The lag is that of a sensor: the same first-order law.
     behind = Lvdt(lag=cylinder.yield_lag)
     return cylinder.compliance * apply_sensor(behind, load - cylinder.zero_load, period)
 
 
 @compilable
 def share_of_load(compliance: float, lag: float, timestep: float) -> float:
-    """The displacement's rate for each newton of load, m/(Ns), by the implicit Euler rule: y' =
-    (compliance·load − y)/(lag + timestep)."""
+    """Return the yielding rate per newton of load, m/(Ns).
+
+    The implicit Euler rule gives y' = (compliance·load − y)/(lag + timestep).
+    """
     return compliance / (lag + timestep)
 
 
 @compilable
 def yielding_rate(share: float, load: float, yielded: float, lag: float, timestep: float) -> float:
-    """How fast a plate yields, m/s.
+    """Return the rate at which a plate yields, m/s.
 
     Parameters
     ----------
     share
-        Of its compliance, m/(Ns); see `share_of_load`.
+        Rate per newton of load, m/(Ns), by `share_of_load`.
     load
-        N.
+        Load, N.
     yielded
-        How far it has yielded already, m.
+        Displacement so far, m.
     lag, timestep
-        s.
+        Lag of the plate and length of the step, s.
     """
     return share * load - yielded / (lag + timestep)
 
@@ -70,17 +72,50 @@ def rod_load(
     forward: float,
     backward: float,
 ) -> float:
-    """What the rod loads a yielding plate with, N, at the carriage's velocity `v`.
+    """Return the rod's load on a yielding plate, N, at a velocity v of the carriage, m/s.
 
-    The plate moves with w = free + share·load; the load is force − viscous·(w − v) − dry friction
-    of w − v. Parameters as in `solve_yielding`.
+    The plate moves with w = free + share·load, and load = force − viscous·(w − v) − F_dry(w − v).
+    Parameters are those of `solve_yielding`.
     """
-    apart = free - v + share * force
-    if apart > share * forward:
-        return force - forward - viscous * (apart - share * forward) / (1.0 + share * viscous)
-    if apart < -share * backward:
-        return force + backward - viscous * (apart + share * backward) / (1.0 + share * viscous)
+    # Slide forward, slide backward, or stick with w = v.
+    sliding = free - v + share * force
+    if sliding > share * forward:
+        return force - forward - viscous * (sliding - share * forward) / (1.0 + share * viscous)
+    if sliding < -share * backward:
+        return force + backward - viscous * (sliding + share * backward) / (1.0 + share * viscous)
     return (v - free) / share
+
+
+@compilable
+def solve_sliding(
+    momentum: float,
+    inertia: float,
+    timestep: float,
+    free: float,
+    share: float,
+    force: float,
+    viscous: float,
+    forward: float,
+    backward: float,
+) -> float:
+    """Solve inertia·v + timestep·load(v) = momentum for the velocity of a sliding carriage, m/s.
+
+    `momentum` contains the rail's friction impulse, Ns. The other parameters are those of
+    `solve_yielding`.
+    """
+    # Below `slow` the plate runs ahead of the carriage, above `fast` behind it, and in between the
+    # rod sticks.
+    slow, fast = free + share * (force - forward), free + share * (force + backward)
+    slope = viscous / (1.0 + share * viscous)
+    if inertia * slow + timestep * (force - forward) >= momentum:
+        return (momentum - timestep * (force - forward - slope * slow)) / (
+            inertia + timestep * slope
+        )
+    if inertia * fast + timestep * (force + backward) <= momentum:
+        return (momentum - timestep * (force + backward - slope * fast)) / (
+            inertia + timestep * slope
+        )
+    return (momentum + timestep * free / share) / (inertia + timestep / share)
 
 
 @compilable
@@ -96,35 +131,38 @@ def solve_yielding(
     forward: float,
     backward: float,
 ) -> tuple[float, float]:
-    """The carriage's velocity v and the load of a plate that yields to it.
+    """Solve for the carriage's velocity v and the load of a plate that yields to it.
 
-    Solves inertia·v + rail friction + timestep·load(v) ∋ rhs exactly: the left side grows with v
-    and is linear between the points where rail or rod begin to slide.
+    The inclusion inertia·v + rail friction(v) + timestep·load(v) ∋ rhs is solved exactly. Its left
+    side grows with v and is linear between the points where rail or rod begin to slide.
 
     Parameters
     ----------
-    rhs, inertia
-        Momentum Ns without the rod's force, and kg.
+    rhs
+        Momentum without the rod's force, Ns.
+    inertia
+        Inertia with implicit damping, kg.
     timestep
-        s.
+        Length of the step, s.
     rail
-        Impulses, Ns, that it can bear against positive and negative v.
+        Limits of the rail's friction impulse against positive and negative v, Ns.
     free
-        The plate's velocity without load, m/s.
+        Velocity of the plate without load, m/s.
     share
-        The plate's velocity for each newton of load, m/(Ns), above 0.
+        Velocity of the plate per newton of load, m/(Ns), above 0.
     force
-        Of the motor without friction, N.
+        Motor force without friction, N.
     viscous
-        Of the motor, Ns/m.
+        Viscous friction of the motor, Ns/m.
     forward, backward
-        What the motor's dry friction can bear against positive and negative plate − v, N.
+        Limits of the motor's dry friction against positive and negative plate − v, N.
 
     Returns
     -------
     tuple
-        v in m/s, load in N.
+        Velocity v, m/s, and load, N.
     """
+    # At rest, does the rail hold the carriage?
     still = (
         timestep
         * rod_load(
@@ -139,9 +177,9 @@ def solve_yielding(
         - rhs
     )
     if still + rail[0] < 0.0:
-        left = rhs - rail[0]
+        momentum = rhs - rail[0]
     elif still - rail[1] > 0.0:
-        left = rhs + rail[1]
+        momentum = rhs + rail[1]
     else:
         return 0.0, rod_load(
             v=0.0,
@@ -152,16 +190,17 @@ def solve_yielding(
             forward=forward,
             backward=backward,
         )
-    # Below `slow` the plate runs ahead of the carriage, above `fast` behind it, and in between the
-    # rod sticks.
-    slow, fast = free + share * (force - forward), free + share * (force + backward)
-    slope = viscous / (1.0 + share * viscous)
-    if inertia * slow + timestep * (force - forward) >= left:
-        v = (left - timestep * (force - forward - slope * slow)) / (inertia + timestep * slope)
-    elif inertia * fast + timestep * (force + backward) <= left:
-        v = (left - timestep * (force + backward - slope * fast)) / (inertia + timestep * slope)
-    else:
-        v = (left + timestep * free / share) / (inertia + timestep / share)
+    v = solve_sliding(
+        momentum=momentum,
+        inertia=inertia,
+        timestep=timestep,
+        free=free,
+        share=share,
+        force=force,
+        viscous=viscous,
+        forward=forward,
+        backward=backward,
+    )
     return v, rod_load(
         v=v,
         free=free,

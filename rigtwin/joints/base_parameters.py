@@ -1,9 +1,8 @@
-"""Base parameters: the combinations of inertial parameters that joint forces can identify.
+"""Base parameters: the sums of inertial parameters that joint forces can identify.
 
-A joint's force is linear in the inertial parameters of bodies and rotors. Columns of that regressor
-that are linearly dependent for every motion can only be identified as a sum (Gautier and Khalil,
-IEEE Transactions on Robotics and Automation 6(3), 1990). The dependencies are computed numerically,
-as in Gautier, Journal of Robotic Systems 8(4), 1991.
+Forces are linear in the inertial parameters, τ = Y·π. Linearly dependent columns of the regressor Y
+can only be identified as sums (Gautier and Khalil, IEEE Transactions on Robotics and Automation
+6(3), 1990; numerically as in Gautier, Journal of Robotic Systems 8(4), 1991).
 """
 
 from __future__ import annotations
@@ -19,31 +18,30 @@ from rigtwin.models.rigid import RigidBodies
 from rigtwin.numerics.arrays import Array
 
 STATES, SEED = 200, 23
-"""Number of random joint states in the regressor, and the seed they are drawn with."""
+"""Number of random states at which the regressor is evaluated, and seed of these states."""
 SPREAD = (1.0, 2.0, 10.0)
 """RMS of positions, velocities and accelerations, in rad or m and their derivatives by s."""
 DEPENDENT = 1e-8
-"""Relative residual of a column below which it counts as linearly dependent on earlier columns."""
+"""Relative residual of a column below which it is a linear combination of earlier columns."""
 COUNTS = 1e-6
-"""Coefficients below this are rounding errors and are dropped."""
+"""Smallest coefficient that is not a rounding error."""
 
 
 def find_base_parameters(machine: Machine) -> tuple[Mapping[str, float], ...]:
-    """Return the identifiable combinations of the inertial parameters of bodies and rotors.
+    """Find the base parameters of a machine's bodies and rotors.
 
     Parameters
     ----------
     machine
-        Machine whose joints act on each other and follow a prescribed motion, with bodies among
-        its components. All other bodies are taken as known.
+        Machine of coupled joints with prescribed motion, with bodies among its components. Bodies
+        that are not components are taken as known.
 
     Returns
     -------
     tuple of mappings
-        Base parameters, linearly independent of each other. Each maps a parameter to its
-        coefficient in the sum; the first coefficient is 1. Parameters are named `component.name`
-        with the names of `INERTIAL`, or `inertia` of a rotor. A parameter in none of the sums is
-        unidentifiable. Empty for all other machines.
+        Independent sums: parameter → coefficient, with 1 for the first. A parameter is
+        `component.name`, with the names of `INERTIAL`, or `inertia` of a rotor. A parameter in no
+        sum cannot be identified. Empty for other machines.
     """
     plant, components = machine.plant, machine.components
     at: dict[type, list[Component]] = {Body: [], Rotor: [], Guide: []}
@@ -65,21 +63,20 @@ def find_base_parameters(machine: Machine) -> tuple[Mapping[str, float], ...]:
     for rotor in at[Rotor]:
         along = np.array([dict(rotor.acts_on).get(joint, 0.0) for joint in joints])
         columns[f"{rotor.name}.inertia"] = np.outer(along, along @ motion[2])[rows].ravel()
-    # Bodies follow from the base outwards, so that the parameters of outer bodies are expressed
-    # by those of inner ones.
+    # Rotors first, then bodies from the base outwards: a dependent parameter of an outer body is
+    # added to those of inner bodies.
     for body in at[Body]:
         regressor = bodies.regressor(motion, body.mjcf)[:, rows].reshape(len(INERTIAL), -1)
-        names = [f"{body.name}.{word}" for word in INERTIAL]
-        columns |= dict(zip(names, regressor, strict=True))
+        columns |= {
+            f"{body.name}.{word}": each for word, each in zip(INERTIAL, regressor, strict=True)
+        }
     return _sum_up(columns)
 
 
 def _sum_up(columns: Mapping[str, Array]) -> tuple[Mapping[str, float], ...]:
-    """Return the independent sums of the columns' parameters.
+    """Return independent sums of the columns' parameters.
 
-    A column that depends linearly on earlier columns adds its parameter to their sums.
-    """
-    """
+    A column that is a linear combination of earlier ones adds its parameter to their sums.
     """
     chosen: list[str] = []
     sums: dict[str, dict[str, float]] = {}
@@ -88,15 +85,16 @@ def _sum_up(columns: Mapping[str, Array]) -> tuple[Mapping[str, float], ...]:
         # A zero column belongs to a parameter that no force depends on.
         if size == 0.0:
             continue
-        before = np.stack([columns[name] for name in chosen], axis=1) if chosen else None
+        before = np.stack([columns[earlier] for earlier in chosen], axis=1) if chosen else None
         if before is not None:
+            # Columns of kg, kg m and kg m² differ in size: normalise before the least squares.
             lengths = np.linalg.norm(before, axis=0)
             # Columns differ in unit and size; without this scaling lstsq would judge rank by unit.
             shares = np.linalg.lstsq(before / lengths, column, rcond=None)[0] / lengths
             if float(np.linalg.norm(column - before @ shares)) < DEPENDENT * size:
-                for independent, share in zip(chosen, shares, strict=True):
+                for earlier, share in zip(chosen, shares, strict=True):
                     if abs(share) > COUNTS:
-                        sums[independent][name] = float(share)
+                        sums[earlier][name] = float(share)
                 continue
         # An independent column starts a new sum, in which its own coefficient is 1.
         chosen.append(name)

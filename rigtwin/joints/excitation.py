@@ -48,6 +48,7 @@ def excite(
     configuration = machine.configuration._replace(timing=timing)
     time = np.arange(configuration.ticks) * timing.period
     for number, share in enumerate(REACHES, 1):
+        # Fixed seeds: what the machine can show must not differ from call to call.
         random = np.random.default_rng([number, 17])
         demands = {}
         for channel in demanded_channels(machine):
@@ -57,6 +58,7 @@ def excite(
             wave = multisine(
                 time,
                 lowest=BAND[0],
+                # Differentiating twice needs several samples per wave.
                 highest=min(BAND[1], 0.2 / timing.period),
                 spacing=BAND[0],
                 slope=SLOPE,
@@ -69,6 +71,7 @@ def excite(
         try:
             yield machine.physics.simulate(machine, name, configuration, demands, number)
         except RigtwinError:
+            # A motion that diverges shows nothing: the series ends here.
             return
 
 
@@ -100,6 +103,7 @@ def reach_of_replay(machine: Machine, channel: tuple[str, str]) -> Reach | None:
 def _gentle_force(joint: Joint) -> float:
     """Return half the weight, or what moves the joint to and fro once a second, N or Nm."""
     _, half = _range(joint)
+    # A joint without weight: force m·ω²·x for an oscillation of 1 Hz over half the range.
     weight = 0.5 * max(np.abs(joint.gravity))
     return weight or joint.inertia * (2.0 * math.pi) ** 2 * half
 

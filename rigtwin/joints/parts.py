@@ -1,7 +1,7 @@
-"""A machine in parts that share nothing: what can be wrong with one changes no signal of another.
+"""Division of a machine into independent parts: no effect of one part changes another's signals.
 
-Friction at one joint of an arm changes the torque of that joint alone, so a search for it need not
-know of the others; what couples joints keeps them together.
+Friction at one joint of an arm changes the torque of that joint alone, so its search needs no other
+joint. Components that couple joints keep them in one part.
 """
 
 from __future__ import annotations
@@ -12,18 +12,19 @@ from rigtwin.description.machine import Component, Machine
 
 
 def parts(machine: Machine) -> tuple[Machine, ...]:
-    """The machine as several, each of some of its signals and of the components that change them.
+    """Divide a machine into parts with disjoint signals and the components that change them.
 
     Parameters
     ----------
     machine
-        As it is described.
+        Description of the machine.
 
     Returns
     -------
     tuple of Machine
-        In the order of their first signals; the machine itself where it does not fall apart.
+        Parts in the order of their first signals, or the machine itself if it cannot be divided.
     """
+    # Connected components: a component of the machine merges all groups of signals that it changes.
     groups = [{row.name} for row in machine.rows]
     for component in machine.components.values():
         changed = _changes(machine, component)
@@ -39,12 +40,12 @@ def parts(machine: Machine) -> tuple[Machine, ...]:
 
 
 def _changes(machine: Machine, component: Component) -> set[str]:
-    """The signals that an effect of a component may change."""
+    """Return the signals that an effect of a component may change."""
     effects = [effect for effect in machine.effects() if effect.group == component.name]
     if not effects:
         return set()
     if component.name in {mover for replay in machine.replays for mover in replay.moved_by}:
-        # A joint that moves otherwise than measured takes other forces of all.
+        # Another motion of one joint changes the forces of all joints.
         return {row.name for row in machine.rows if any(effect.searched for effect in effects)}
     if component.element == "body":
         return {row.name for row in machine.rows}
@@ -55,13 +56,13 @@ def _changes(machine: Machine, component: Component) -> set[str]:
 
 
 def _only(machine: Machine, signals: set[str]) -> Machine:
-    """The machine of these signals: all else is beyond doubt."""
-    own = {
+    """Return the machine with these signals alone; no other component can have an effect."""
+    doubted = {
         name
         for name, component in machine.components.items()
         if _changes(machine, component) & signals
     }
-    nothing: frozenset[str] = frozenset()
+    no_kinds: frozenset[str] = frozenset()
     return replace(
         machine,
         replays=tuple(
@@ -69,8 +70,8 @@ def _only(machine: Machine, signals: set[str]) -> Machine:
             for replay in machine.replays
         ),
         components={
-            name: component if name in own else replace(component, kinds=nothing)
+            name: component if name in doubted else replace(component, kinds=no_kinds)
             for name, component in machine.components.items()
         },
-        tolerances=tuple(t for t in machine.tolerances if t.group in own | signals),
+        tolerances=tuple(t for t in machine.tolerances if t.group in doubted | signals),
     )

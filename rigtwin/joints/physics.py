@@ -77,6 +77,7 @@ class IndependentJoints(Physics):
         joints = [
             JointModel(machine, replay, inputs, configuration, steps) for replay in machine.replays
         ]
+        # One joint needs no numbering of its disturbances.
         return joints[0] if len(joints) == 1 else IndependentModel(joints)
 
     def record(
@@ -111,6 +112,7 @@ class IndependentJoints(Physics):
     ) -> Recording:
         from rigtwin.models.machine_twin import simulate_machine
 
+        # Without limits, the motion shows how far the machine would go.
         unlimited: Any = Nothing()
         configuration = configuration._replace(safety=unlimited)
         columns, _ = simulate_machine(machine, configuration, demands, seed)
@@ -227,9 +229,9 @@ class PrescribedJoints(IndependentJoints):
     def model(
         self, machine: Machine, inputs: Inputs, configuration: Configuration, steps: int
     ) -> Model[Any]:
-        from rigtwin.models.moved import MovedModel
+        from rigtwin.models.inverse_dynamics import InverseDynamicsModel
 
-        return MovedModel(machine, machine.replays[0], inputs)
+        return InverseDynamicsModel(machine, machine.replays[0], inputs)
 
     def reach(self, machine: Machine, channel: tuple[str, str]) -> tuple[float, float] | None:
         from rigtwin.joints.excitation import reach_of_component
@@ -260,9 +262,9 @@ class FreeJoints(PrescribedJoints):
     def model(
         self, machine: Machine, inputs: Inputs, configuration: Configuration, steps: int
     ) -> Model[Any]:
-        from rigtwin.models.coupled import CoupledModel
+        from rigtwin.models.forward_dynamics import ForwardDynamicsModel
 
-        return CoupledModel(machine, machine.replays[0], inputs, configuration, steps)
+        return ForwardDynamicsModel(machine, machine.replays[0], inputs, configuration, steps)
 
     def base_parameters(self, machine: Machine) -> tuple[Mapping[str, float], ...]:
         return ()

@@ -19,37 +19,37 @@ def joint_positions(
     Parameters
     ----------
     machine
-        Machine that the signals belong to.
+        Machine the signals belong to.
     columns
-        Topic → field → values, shape (ticks,), as in a recording.
+        Topic → field → values, shape (ticks,), as in recordings.
     period
-        Period of a tick, in s.
+        Time from tick to tick, s.
 
     Returns
     -------
     dict of Array
-        Joint → position at every tick, in m or rad: measured, else commanded, else integrated from
-        the velocity. Joints without a signal are left out.
+        Joint → position at every tick, m or rad: measured, else commanded, else the integral of the
+        velocity. Joints without any of these signals are left out.
     """
     positions: dict[str, Array] = {}
-    # In the order of trust: a joint takes the first kind of signal it has.
     for wanted in ("position", "command", "velocity"):
         for name, component in machine.components.items():
             part = getattr(machine.plant, name)
-            says = "command" if isinstance(part, PositionActuator) else measures(part)
+            quantity = "command" if isinstance(part, PositionActuator) else measures(part)
             signal = _find_signal(component, columns)
-            if says != wanted or signal is None or component.joint in ("", *positions):
+            if quantity != wanted or signal is None or component.joint in ("", *positions):
                 continue
-            # The mean is removed, because an offset of a velocity would make the position drift.
+            # The mean velocity is an offset of the sensor and would integrate to a drift.
             summed = np.cumsum(signal - np.mean(signal)) * period
             positions[component.joint] = summed if wanted == "velocity" else signal
     for name, component in machine.components.items():
-        # A sensor between joints determines the last joint whose position is unknown.
+        # A sensor of a sum of joints gives the one unknown joint among them.
         signal = _find_signal(component, columns)
         unknown = [(joint, share) for joint, share in component.acts_on if joint not in positions]
         if measures(getattr(machine.plant, name)) == "position" and len(unknown) == 1:
-            acts_on = component.acts_on
-            known = [share * positions[joint] for joint, share in acts_on if joint in positions]
+            known = [
+                share * positions[joint] for joint, share in component.acts_on if joint in positions
+            ]
             if signal is not None:
                 ((joint, share),) = unknown
                 positions[joint] = (signal - sum(known)) / share

@@ -1,7 +1,8 @@
-"""Ways in which a component may be disturbed freely: functions of what it goes through.
+"""Basis functions of an unknown input: functions of a component's motion, force, past and time.
 
-Where no effect of the library explains a gap, the combination of these that does says where it
-enters and what it goes with.
+Where no effect of the library explains a gap, a linear combination of these functions is fitted as
+a free disturbance of one component. It shows where the disturbance enters and what it correlates
+with.
 """
 
 from __future__ import annotations
@@ -15,20 +16,29 @@ from rigtwin.models.model import Form
 from rigtwin.numerics.arrays import Array
 
 WAVES = (0.005, 0.008, 0.012, 0.018, 0.028)
-"""m; wave lengths of the rail's friction along the way."""
+"""Wavelengths of the rail's friction along its length, m."""
 STROKE_WAVES = (0.02, 0.04, 0.08, 0.16, 0.32)
-"""Of the stroke; wave lengths of what changes along a guide."""
+"""Wavelengths of forces along a guide, as shares of the stroke."""
 RELAXATIONS = (0.02, 0.07, 0.25)
-"""s; times in which a tyre or a cylinder may relax."""
+"""Relaxation times of a tyre or a cylinder, s."""
 TICK_RELAXATIONS = (2.0, 8.0, 30.0, 120.0)
-"""Ticks; times in which a part of any machine may relax."""
+"""Relaxation times of a component of any machine, in ticks."""
 NamedSignals = Iterator[tuple[str, Array]]
 
 
 @dataclass(frozen=True)
 class Passage:
-    """What a component goes through, shape (ticks,) each: the signal that it handles, position m,
-    speed m/s, load N; period: of a tick, s."""
+    """Signals of a component over a recording.
+
+    Attributes
+    ----------
+    signal : Array
+        Signal that the component handles: reading, force or position, shape (ticks,).
+    position, speed, load : Array
+        Motion and load of the component, m, m/s and N, shape (ticks,).
+    period : float
+        Time from tick to tick, s.
+    """
 
     signal: Array
     position: Array
@@ -38,50 +48,56 @@ class Passage:
 
     @property
     def time(self) -> Array:
+        """Time since the start, s, shape (ticks,)."""
         return np.arange(len(self.signal)) * self.period
 
     @property
     def acceleration(self) -> Array:
+        """Acceleration, m/s², shape (ticks,)."""
         return np.gradient(self.speed, self.period)
 
 
 def low_pass(signal: Array, time_constant: float, period: float) -> Array:
-    """The signal through a first-order lag, from where it starts.
+    """Filter a signal by a first-order lag, T·y' = u − y, that starts settled.
 
     Parameters
     ----------
     signal
-        Shape (ticks,).
-    time_constant, period
-        s.
+        Signal u, shape (ticks,).
+    time_constant
+        Time constant T, s.
+    period
+        Time from tick to tick, s.
 
     Returns
     -------
     array
-        Shape (ticks,).
+        Filtered signal y, shape (ticks,).
     """
+    # Implicit Euler: stable for any time constant.
     share = period / (time_constant + period)
     start = [(1.0 - share) * signal[0]]
-    from scipy.signal import lfilter  # Late: it takes a second.
+    from scipy.signal import lfilter  # Imported late: scipy is slow to load.
 
     out, _ = lfilter([share], [1.0, share - 1.0], signal, zi=start)
     return np.asarray(out)
 
 
 def _past(signal: Array, seconds: Sequence[float], period: float) -> NamedSignals:
-    for each in seconds:
-        yield "its recent past", low_pass(signal, each, period)
+    for time_constant in seconds:
+        yield "its recent past", low_pass(signal, time_constant, period)
 
 
 def _ticks(period: float) -> list[float]:
     return [ticks * period for ticks in TICK_RELAXATIONS]
 
 
-def _distortion(by: Passage) -> NamedSignals:
-    """What a signal may be bent by."""
-    time = by.time
-    centred = by.signal - np.mean(by.signal)
-    rate = np.gradient(centred, by.period)
+def _distortion(passage: Passage) -> NamedSignals:
+    """Yield distortions of a signal: gain, drift, nonlinearity and delay."""
+    # A delay, to first order, adds the negative rate; a lag of second order the second derivative.
+    time = passage.time
+    centred = passage.signal - np.mean(passage.signal)
+    rate = np.gradient(centred, passage.period)
     yield "a constant", np.ones_like(time)
     yield "time", time
     yield "time squared", time**2
@@ -90,70 +106,71 @@ def _distortion(by: Passage) -> NamedSignals:
     yield "its value cubed", centred**3
     yield "its value growing with time", centred * time
     yield "its rate", rate
-    yield "its rate of rate", np.gradient(rate, by.period)
+    yield "its rate of rate", np.gradient(rate, passage.period)
 
 
-def _inertia(by: Passage) -> NamedSignals:
-    acceleration = by.acceleration
+def _inertia(passage: Passage) -> NamedSignals:
+    acceleration = passage.acceleration
     yield "acceleration", acceleration
-    yield "acceleration growing with time", acceleration * by.time
+    yield "acceleration growing with time", acceleration * passage.time
     yield "acceleration squared", acceleration * np.abs(acceleration)
 
 
-def _friction(by: Passage) -> NamedSignals:
-    """What dry and viscous friction may go with."""
-    sign = np.sign(by.speed)
-    yield "speed", by.speed
-    yield "speed squared", by.speed * np.abs(by.speed)
+def _friction(passage: Passage) -> NamedSignals:
+    """Yield functions that dry and viscous friction may correlate with."""
+    sign = np.sign(passage.speed)
+    yield "speed", passage.speed
+    yield "speed squared", passage.speed * np.abs(passage.speed)
     yield "direction", sign
-    yield "direction growing with time", sign * by.time
-    yield "place", by.position
+    yield "direction growing with time", sign * passage.time
+    yield "place", passage.position
 
 
-def _motor(by: Passage) -> NamedSignals:
-    yield from _distortion(by)
-    yield from _friction(by)
+def _motor(passage: Passage) -> NamedSignals:
+    yield from _distortion(passage)
+    yield from _friction(passage)
 
 
-def _rail(by: Passage) -> NamedSignals:
-    yield from _friction(by)
-    sign = np.sign(by.speed)
+def _rail(passage: Passage) -> NamedSignals:
+    yield from _friction(passage)
+    sign = np.sign(passage.speed)
+    # Sine and cosine of each wavelength together represent any phase.
     for wave in WAVES:
-        yield "direction and place", sign * np.sin(2 * np.pi * by.position / wave)
-        yield "direction and place", sign * np.cos(2 * np.pi * by.position / wave)
+        yield "direction and place", sign * np.sin(2 * np.pi * passage.position / wave)
+        yield "direction and place", sign * np.cos(2 * np.pi * passage.position / wave)
 
 
-def _tyre(by: Passage) -> NamedSignals:
-    deflection, squeeze = by.signal, np.gradient(by.signal, by.period)
+def _tyre(passage: Passage) -> NamedSignals:
+    deflection, squeeze = passage.signal, np.gradient(passage.signal, passage.period)
     yield "deflection", deflection
     yield "deflection squared", deflection**2
     yield "deflection cubed", deflection**3
-    yield "deflection growing with time", deflection * by.time
+    yield "deflection growing with time", deflection * passage.time
     yield "rate of deflection", squeeze
     yield "rate and deflection", squeeze * deflection
-    yield from _past(deflection, RELAXATIONS, by.period)
+    yield from _past(deflection, RELAXATIONS, passage.period)
 
 
-def _load_cell(by: Passage) -> NamedSignals:
-    yield from _distortion(by)
-    yield "the carriage's acceleration", by.acceleration
+def _load_cell(passage: Passage) -> NamedSignals:
+    yield from _distortion(passage)
+    yield "the carriage's acceleration", passage.acceleration
 
 
-def _cylinder(by: Passage) -> NamedSignals:
-    yield from _distortion(by)
-    yield from _past(by.signal, RELAXATIONS, by.period)
-    yield "its load", by.load - np.mean(by.load)
+def _cylinder(passage: Passage) -> NamedSignals:
+    yield from _distortion(passage)
+    yield from _past(passage.signal, RELAXATIONS, passage.period)
+    yield "its load", passage.load - np.mean(passage.load)
 
 
-def _position(by: Passage) -> NamedSignals:
-    """A joint's position that is commanded or measured."""
-    yield from _distortion(by)
-    yield from _past(by.signal, _ticks(by.period), by.period)
-    yield "direction", np.sign(by.speed)
+def _position(passage: Passage) -> NamedSignals:
+    """Yield disturbances of a joint's commanded or measured position."""
+    yield from _distortion(passage)
+    yield from _past(passage.signal, _ticks(passage.period), passage.period)
+    yield "direction", np.sign(passage.speed)
 
 
-def _guide(by: Passage) -> NamedSignals:
-    speed, position = by.speed, by.position - np.mean(by.position)
+def _guide(passage: Passage) -> NamedSignals:
+    speed, position = passage.speed, passage.position - np.mean(passage.position)
     sign = np.sign(speed)
     typical = float(np.sqrt(np.mean(speed**2))) or 1.0
     yield "a constant", np.ones_like(speed)
@@ -161,9 +178,10 @@ def _guide(by: Passage) -> NamedSignals:
     yield "speed squared", speed * np.abs(speed)
     yield "speed cubed", speed**3
     yield "speed either way", np.abs(speed)
+    # A smooth sign: the exact tick of a reversal is not known to better than the noise.
     yield "direction", np.tanh(speed / (0.02 * typical))
     yield "slow motion's direction", sign * np.exp(-((speed / (0.3 * typical)) ** 2))
-    yield "direction growing with time", sign * by.time
+    yield "direction growing with time", sign * passage.time
     yield "place", position
     yield "place cubed", position**3
     stroke = float(np.ptp(position)) or 1.0
@@ -171,7 +189,7 @@ def _guide(by: Passage) -> NamedSignals:
         for name, weight in (("place along the stroke", 1.0), ("direction and place", sign)):
             yield name, weight * np.sin(2 * np.pi * position / (share * stroke))
             yield name, weight * np.cos(2 * np.pi * position / (share * stroke))
-    yield from _past(speed, _ticks(by.period), by.period)
+    yield from _past(speed, _ticks(passage.period), passage.period)
 
 
 BASES: dict[str, Callable[[Passage], NamedSignals]] = {
@@ -186,24 +204,24 @@ BASES: dict[str, Callable[[Passage], NamedSignals]] = {
     "tyre": _tyre,
     "mass": _inertia,
 }
-"""Role of a component → the functions that may disturb it."""
+"""Role of a component → basis functions of its disturbances."""
 
 
-def forms(role: str, entry: str, by: Passage) -> list[Form]:
-    """All ways to disturb one component freely.
+def forms(role: str, entry: str, passage: Passage) -> list[Form]:
+    """Return all basis functions of one component's disturbance.
 
     Parameters
     ----------
     role
-        Its part in the machine, see `BASES`.
+        Role of the component in the machine, a key of `BASES`.
     entry
-        Where the disturbance enters the model.
+        Place where the disturbance enters, as `Model.predict_disturbed` takes it.
     by
-        What the component goes through.
+        Signals of the component.
 
     Returns
     -------
     list of Form
-        One a function.
+        One form for each basis function.
     """
-    return [Form(name, entry, signal) for name, signal in BASES[role](by)]
+    return [Form(name, entry, signal) for name, signal in BASES[role](passage)]

@@ -1,5 +1,4 @@
-"""A controller in the loop of a twin that goes from tick to tick: what its sensors read, and what
-it commands by that."""
+"""A controller in the loop of a twin that advances tick by tick: its readings and its commands."""
 
 from __future__ import annotations
 
@@ -18,35 +17,36 @@ from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
 
 Tick = Callable[[Mapping[str, float], Mapping[str, float]], "float | Mapping[str, float]"]
-"""A controller's command, or commands by name, for what its sensors read and for what is demanded,
-both by name."""
+"""Controller of the user: readings by sensor, demands by name → one command, or commands by
+name."""
 Command = Callable[[int, Mapping[str, float]], "float | Mapping[str, float]"]
-"""The same for a tick's number and what the sensors read."""
+"""Controller in the loop: number of the tick, readings by sensor → one command, or commands by
+name."""
 Columns = Mapping[str, Mapping[str, Array]]
 """Topic → field → signal, shape (ticks,)."""
 
 
 @kernel
 def _evaluate(operations: np.ndarray, registers: Array, memory: Array, period: float) -> float:
-    """A formula's value at a tick; see `controllers.formula.run`."""
+    """Return a formula's value at a tick; see `controllers.formula.run`."""
     return run(operations, registers, memory, period)
 
 
 class Readings:
-    """What sensors read, one tick after another, with their noise and bits.
+    """Readings of sensors, one tick after another, with noise and quantisation.
 
     Parameters
     ----------
     plant
-        Its components.
+        Components of the machine.
     names
-        Of the sensors.
+        Names of the sensors.
     noise
-        Sensor → what is added to its reading, shape (ticks,); none by default.
+        Sensor → noise added to its reading, shape (ticks,). Sensors without an entry have none.
     period
-        s, of a tick.
+        Time from tick to tick, s.
     ticks
-        Of the test.
+        Number of ticks of the test.
     """
 
     def __init__(
@@ -58,48 +58,81 @@ class Readings:
         ticks: int,
     ) -> None:
         self.signals = {name: np.zeros(ticks) for name in names}
-        """Sensor → what it read so far, shape (ticks,)."""
+        """Sensor → readings up to the current tick, zero after it, shape (ticks,)."""
         self._noise = noise
         self._bits = {name: getattr(plant, name).resolution for name in names}
         self._models = {name: transducer(getattr(plant, name), period) for name in names}
         self._states = {name: start_transducer(each) for name, each in self._models.items()}
 
     def take(self, tick: int, true: Mapping[str, float]) -> dict[str, float]:
-        """Sensor → reading. true: of each, what an ideal one would read."""
-        found = {}
+        """Return the readings of a tick by sensor.
+
+        Parameters
+        ----------
+        tick
+            Number of the tick.
+        true
+            Sensor → reading of an ideal sensor.
+        """
+        readings = {}
         for name, model in self._models.items():
             value = transduce(model, self._states[name], true[name])
             if name in self._noise:
                 value += float(self._noise[name][tick])
             bit = self._bits[name]
-            found[name] = self.signals[name][tick] = round(value / bit) * bit if bit else value
-        return found
+            readings[name] = self.signals[name][tick] = round(value / bit) * bit if bit else value
+        return readings
 
 
-def commands_of(found: object, names: Sequence[str]) -> list[float]:
-    """The commands that a controller gave, one a name.
+def commands_of(answer: object, names: Sequence[str]) -> list[float]:
+    """Return a controller's commands in the order of the actuators.
 
-    Raises RigtwinError for anything but a finite number for each.
+    Parameters
+    ----------
+    answer
+        Answer of the controller: a number for a single actuator, or numbers by name.
+    names
+        Names of the commands.
+
+    Returns
+    -------
+    list of float
+        One command for each name.
+
+    Raises
+    ------
+    RigtwinError
+        If the answer is not exactly one finite number for each name.
     """
-    given: Mapping[str, Any] = found if isinstance(found, Mapping) else dict.fromkeys(names, found)
-    if (isinstance(found, Mapping) or len(names) == 1) and set(given) == set(names):
+    by_name: Mapping[str, Any] = (
+        answer if isinstance(answer, Mapping) else dict.fromkeys(names, answer)
+    )
+    if (isinstance(answer, Mapping) or len(names) == 1) and set(by_name) == set(names):
         try:
-            commands = [float(given[name]) for name in names]
+            commands = [float(by_name[name]) for name in names]
         except (TypeError, ValueError, OverflowError):
             commands = [math.nan]
         if all(map(math.isfinite, commands)):
             return commands
     expected = f"expected {{{', '.join(f'{name!r}: number' for name in names)}}}"
     or_one = "expected a finite number" if len(names) == 1 else expected
-    raise RigtwinError(f"the controller gave {found!r:.60}; {or_one}")
+    raise RigtwinError(f"the controller gave {answer!r:.60}; {or_one}")
 
 
-def command_by_function(own: Tick, columns: Columns) -> Command:
-    """A controller of one's own. columns: with what is demanded, under /command."""
+def command_by_function(controller: Tick, columns: Columns) -> Command:
+    """Return a controller in the loop that calls the user's function.
+
+    Parameters
+    ----------
+    controller
+        Function of readings and demands, both by name.
+    columns
+        Signals of the test: topic → field → signal. Demands are under `/command`.
+    """
     demanded = columns.get("/command", {})
 
     def command(tick: int, sensed: Mapping[str, float]) -> float | Mapping[str, float]:
-        return own(sensed, {name: float(signal[tick]) for name, signal in demanded.items()})
+        return controller(sensed, {name: float(signal[tick]) for name, signal in demanded.items()})
 
     return command
 
@@ -111,34 +144,39 @@ def command_by_formula(
     sensors: Mapping[Channel, str],
     period: float,
 ) -> Command:
-    """The controller of a description.
+    """Return a controller in the loop by the formula of a description.
 
     Parameters
     ----------
     control
-        The formula.
+        Formula of the controller.
     settings
-        Its numbers.
+        Values of its settings.
     columns
-        With what it reads besides sensors.
+        Signals of the test: topic → field → signal, shape (ticks,).
     sensors
-        Channel → sensor.
+        Channel → sensor, for inputs that are simulated.
     period
-        s, of a tick.
+        Time from tick to tick, s.
+
+    Returns
+    -------
+    Command
+        Function of the tick and the readings.
     """
     program = control.program(settings)
     operations = np.ascontiguousarray(program.operations)
     registers, memory = program.registers.copy(), control.formula.memory()
-    # Compiled before it is needed: a tick has no time for that.
+    # Compile before the test: a tick of 1 ms has no time for it. Copies keep the state clean.
     _evaluate(operations, registers.copy(), memory.copy(), period)
-    given = [
+    recorded = [
         None if channel in sensors else columns[channel[0]][channel[1]]
         for channel in control.channels
     ]
     read = [sensors.get(channel, "") for channel in control.channels]
 
     def command(tick: int, sensed: Mapping[str, float]) -> float:
-        for number, signal in enumerate(given):
+        for number, signal in enumerate(recorded):
             registers[number] = sensed[read[number]] if signal is None else signal[tick]
         return float(_evaluate(operations, registers, memory, period))
 

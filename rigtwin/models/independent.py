@@ -1,4 +1,4 @@
-"""The model of joints that do not act on each other."""
+"""Model of joints that do not act on each other: one `JointModel` for each."""
 
 from __future__ import annotations
 
@@ -14,7 +14,10 @@ from rigtwin.numerics.arrays import Array
 
 
 class IndependentModel(Model[Plant]):
-    """All joints of one recording, their rows one after another."""
+    """Models of all joints of one recording, with their rows one after another.
+
+    An entry of a disturbance is `number:entry`, with the joint's number and its own entry.
+    """
 
     def __init__(self, joints: Sequence[JointModel]) -> None:
         self._joints = tuple(joints)
@@ -27,10 +30,10 @@ class IndependentModel(Model[Plant]):
         return np.concatenate([each.predict_true(plant) for each in self._joints])
 
     def predict_disturbed(self, plant: Plant, entry: str, amount: Array) -> Array:
-        number, _, own = entry.partition(":")
+        number, _, joint_entry = entry.partition(":")
         return np.concatenate(
             [
-                each.predict_disturbed(plant, own, amount)
+                each.predict_disturbed(plant, joint_entry, amount)
                 if place == int(number)
                 else each.predict(plant)
                 for place, each in enumerate(self._joints)
@@ -51,8 +54,8 @@ class IndependentModel(Model[Plant]):
         ]
 
     def disturbance_size(self, entry: str) -> float:
-        number, _, own = entry.partition(":")
-        return self._joints[int(number)].disturbance_size(own)
+        number, _, joint_entry = entry.partition(":")
+        return self._joints[int(number)].disturbance_size(joint_entry)
 
     def motion(self, component: str, plant: Plant) -> Motion:
         return self._joints[self._index_of(component)].motion(component, plant)
@@ -83,6 +86,6 @@ class IndependentModel(Model[Plant]):
 
     def thin(self, longest: float) -> IndependentModel:
         thinned = [each.thin(longest) for each in self._joints]
-        # Rows of one recording have ticks in common.
-        alike = len({each.every for each in thinned}) == 1
-        return IndependentModel(thinned) if alike else self
+        # The rows of all joints are stacked into one array, so they need the same ticks.
+        same_ticks = len({each.every for each in thinned}) == 1
+        return IndependentModel(thinned) if same_ticks else self

@@ -1,5 +1,9 @@
-"""A joint replayed: its motion prescribed by a sensor or a position actuator, or pushed by a force
-actuator."""
+"""Model of one joint that does not act on others.
+
+Its motion is either prescribed by a sensor or a position actuator, and the force is predicted by
+inverse dynamics; or a force actuator or servo pushes it, and its motion is predicted by forward
+dynamics. Both follow the equation of motion in `joint_motion`.
+"""
 
 from __future__ import annotations
 
@@ -35,7 +39,7 @@ from rigtwin.description.control import FormulaControl
 from rigtwin.description.machine import OWN, Machine, ReplayOf, Row
 from rigtwin.models.basis import Passage, forms
 from rigtwin.models.following import follow_command
-from rigtwin.models.guided import RIGID, Inertia, Loop, integrate_pushed, inverse_dynamics
+from rigtwin.models.joint_motion import RIGID, Inertia, Loop, integrate_pushed, inverse_dynamics
 from rigtwin.models.joint_start import AT_REST, JointStart
 from rigtwin.models.model import Form, Model
 from rigtwin.models.start import Start
@@ -45,37 +49,41 @@ from rigtwin.signals.band import limit_band
 from rigtwin.signals.noise import motion_band, smooth, white_noise
 
 INERTIAL = 0.1
-"""Share of a measured force that inertia must have for the motion's band to matter."""
+"""Share of inertia in the measured force above which the band of the motion limits the force."""
 KEPT = 24
-"""Motions that are kept."""
+"""Number of motions that are remembered."""
 ELASTIC = 0.3
-"""Times a measured motion's error over which friction that reverses builds up at least."""
+"""Shortest distance over which friction that reverses builds up, in errors of the measured motion.
+Without it, friction would jump with the noise of the velocity's sign."""
 SMALL = 0.02
-"""Share of a signal's swing that is a small disturbance."""
+"""Size of a small disturbance, as a share of the signal's standard deviation."""
 LIGHTEST = 1e-12
-"""kg or kg m², of what still moves under a finite force."""
+"""Smallest inertia of a joint, kg or kg m². Below it, a finite force has no finite acceleration."""
 SEED = 7
-"""Of the noise whose way through the machine is followed."""
+"""Seed of the noise that is propagated through the machine."""
 NO_COMMAND = formula("0", {})
 
 
 def recover_motion(sensor: Sensor, measured: Array, period: float) -> Array:
-    """The motion behind a measured one that was smoothed before.
+    """Recover the true motion from a measured one that was smoothed.
+
+    Inverts the sensor y = gain·x + offset + drift·t, its first-order lag and its delay.
 
     Parameters
     ----------
     sensor
-        Whose offset, drift, gain, lag and delay are undone.
+        Sensor whose offset, drift, gain, lag and delay are undone.
     measured
-        Shape (ticks,).
+        Smoothed reading, shape (ticks,).
     period
-        s, of a tick.
+        Time from tick to tick, s.
 
     Returns
     -------
     array
-        Shape (ticks,).
+        True motion, shape (ticks,).
     """
+    # A lag T is inverted by x = y + T·y', which needs a smooth signal.
     signal = measured
     if sensor.lag > 0.0:
         signal = signal + sensor.lag * np.gradient(signal, period)
@@ -86,7 +94,21 @@ def recover_motion(sensor: Sensor, measured: Array, period: float) -> Array:
 
 
 class JointModel(Model[Plant]):
-    """One replay of one recording."""
+    """Model of one joint of one recording.
+
+    Parameters
+    ----------
+    machine, replay, inputs, configuration, steps
+        Machine, replay of the joint, recorded signals, settings and integration steps per tick, as
+        in `Physics.model`.
+    every
+        Ticks of the recording from one predicted tick to the next, of a prescribed motion.
+
+    Raises
+    ------
+    RigtwinError
+        If a channel is missing from the recording.
+    """
 
     def __init__(
         self,
@@ -97,8 +119,6 @@ class JointModel(Model[Plant]):
         steps: int,
         every: int = 1,
     ) -> None:
-        """every: ticks from one that is predicted to the next, of a prescribed motion. Raises
-        RigtwinError if a channel is missing."""
         self._machine, self._replay, self._signals, self._steps = (
             machine,
             replay,
@@ -112,7 +132,7 @@ class JointModel(Model[Plant]):
         self._mover = machine.components[replay.moved_by[0]]
         assert self._mover.channel is not None
         topic, name = self._mover.channel
-        # Another controller than the described one cannot be run along: what it commanded is taken.
+        # A controller of the user's own cannot be run along: its recorded commands are used.
         closed = replay.closed and OWN not in inputs.controller
         self._control = control = (
             machine.control if isinstance(machine.control, FormulaControl) and closed else None
@@ -148,10 +168,11 @@ class JointModel(Model[Plant]):
 
     @property
     def band(self) -> float:
-        """Hz, up to which a measured motion shows its acceleration, where much of the force that it
-        takes is inertia; infinite otherwise.
+        """Highest frequency at which a measured motion shows its acceleration, Hz.
 
-        Above it the smoothed motion lacks what the measured force has: both pass the same filter.
+        It is infinite where inertia is a small part of the force. Above the band, smoothing has
+        removed the acceleration from the motion. Predicted and measured forces are compared through
+        the same low-pass filter.
         """
         return self._band
 
@@ -163,7 +184,7 @@ class JointModel(Model[Plant]):
             return math.inf
         moved = self.move(self._configuration.plant)
         inertia = self._parts(self._configuration.plant)[1].mass
-        accelerating = inertia * float(np.std(np.gradient(moved[1], self._apart)))
+        accelerating = inertia * float(np.std(np.gradient(moved[1], self._interval)))
         measured = float(np.std(self._signals.column(*rows[0].channel)))
         if accelerating < INERTIAL * measured:
             return math.inf
@@ -182,7 +203,7 @@ class JointModel(Model[Plant]):
         )
 
     def thin(self, longest: float) -> JointModel:
-        """With fewer ticks if a sensor prescribes the motion."""
+        """Return a model with fewer ticks if a sensor prescribes the motion, or else itself."""
         every = max(int(longest / self._period), 1)
         if self._motion is None or every == 1:
             return self
@@ -191,13 +212,16 @@ class JointModel(Model[Plant]):
         )
 
     @property
-    def _apart(self) -> float:
-        """s, from one tick that is predicted to the next."""
+    def _interval(self) -> float:
+        """Time from one predicted tick to the next, s."""
         return self.every * self._period
 
     def _find_start(self) -> JointStart | None:
-        """By a sensor of the position, or else of the velocity; fitted where a pushed joint in open
-        loop needs it."""
+        """Return the initial state of a pushed joint, or None for a prescribed motion.
+
+        It is read from a position sensor or else a velocity sensor, and fitted in open loop: a
+        controller makes the joint forget it.
+        """
         if not self._free:
             return None
         rows = {row.name: row for row in self.rows if row.kind in ("position", "velocity")}
@@ -216,7 +240,7 @@ class JointModel(Model[Plant]):
         return start
 
     def _start_of(self, plant: Plant) -> Start:
-        """Position and velocity at the start, where a sensor's zero is no place of the joint."""
+        """Return initial position and velocity, corrected for the sensor's zero, m and m/s."""
         if self._start is None:
             return AT_REST
         sensor = getattr(plant, self._start.name)
@@ -225,11 +249,12 @@ class JointModel(Model[Plant]):
         key = self._key(plant)
         if key not in self._starts:
             move = self._prepare_pushed(plant, getattr(plant, self._mover.name))
-            found = self._start.find(sensor, move)
-            self._starts = {**dict(list(self._starts.items())[-KEPT:]), key: found}
+            start = self._start.find(sensor, move)
+            self._starts = {**dict(list(self._starts.items())[-KEPT:]), key: start}
         return self._starts[key]
 
     def _parts(self, plant: Plant) -> tuple[Guide, Inertia]:
+        """Return guide and inertia of the joint as compiled code takes them."""
         replay = self._replay
         guide = Guide() if replay.guide is None else getattr(plant, replay.guide)
         mass = 0.0 if replay.mass is None else getattr(plant, replay.mass).mass
@@ -244,18 +269,21 @@ class JointModel(Model[Plant]):
         return guide, Inertia(mass, joint.positions[0], spacing, load, joint.rest, joint.goes_round)
 
     def _share_of_mass(self, plant: Plant) -> float:
-        """How many times the MJCF's bodies there are; gravity acts on them, not on a rotor."""
+        """Return the factor on the mass of the MJCF's bodies.
+
+        It scales the gravity load. A rotor (armature) has inertia but no weight, so it is excluded.
+        """
         joint, mass = self._replay.joint, self._replay.mass
-        own = joint.inertia - joint.armature
-        return getattr(plant, mass).mass / own if mass is not None and own > 0.0 else 1.0
+        nominal = joint.inertia - joint.armature
+        return getattr(plant, mass).mass / nominal if mass is not None and nominal > 0.0 else 1.0
 
     def _armature(self, plant: Plant) -> float:
-        """The inertia of what turns with the motor alone, kg or kg m²."""
+        """Return the inertia of the rotor behind its gear, kg or kg m²."""
         rotor = self._replay.rotor
         return self._replay.joint.armature if rotor is None else getattr(plant, rotor).inertia
 
     def _key(self, plant: Plant) -> tuple[object, ...]:
-        """What the motion depends on."""
+        """Return all components that the motion depends on, as a key of remembered motions."""
         replay = self._replay
         names = [replay.guide, replay.mass, replay.rotor, self._mover.name, "computer"]
         if self._control is not None:
@@ -265,8 +293,23 @@ class JointModel(Model[Plant]):
         return tuple(getattr(plant, name) for name in names if name is not None)
 
     def move(self, plant: Plant, force: Array | None = None, shift: Array | None = None) -> Array:
-        """Position, velocity, force on the joint and command, shape (4, ticks). force: another on
-        it, N; shift: of its prescribed motion, m; shape (ticks,)."""
+        """Simulate the joint.
+
+        Parameters
+        ----------
+        plant
+            Components of the machine.
+        force
+            Unmodelled force on the joint, N, shape (ticks,). Default: none.
+        shift
+            Displacement of its prescribed motion, m, shape (ticks,). Default: none.
+
+        Returns
+        -------
+        array
+            Position, velocity, force and command, shape (4, ticks). The force is that of the
+            actuator, or the one that the prescribed motion requires.
+        """
         key = self._key(plant)
         if force is None and shift is None and key in self._last:
             return self._last[key]
@@ -295,26 +338,43 @@ class JointModel(Model[Plant]):
         return out
 
     def _undo_sensor(self, sensor: Sensor) -> Array:
-        """The position behind a measured motion: the sensor's offset, gain, lag and delay undone.
-        Of a velocity its mean is no motion, as what is tested does not move away."""
+        """Return the position behind the measured motion, m, shape (ticks,).
+
+        A measured velocity is integrated without its mean: that is the sensor's offset, as a tested
+        joint does not move away.
+        """
         assert self._motion is not None
         signal = recover_motion(sensor, self._motion, self._period)
         return np.cumsum(signal - np.mean(signal)) * self._period if self._integrated else signal
 
     def prescribe(self, plant: Plant, signal: Array) -> Array:
-        """The joint under a prescribed motion, shape (4, ticks) as `move`. signal: what an ideal
-        sensor that moves it would read, shape (ticks,)."""
+        """Simulate the joint with a prescribed motion.
+
+        Parameters
+        ----------
+        plant
+            Components of the machine.
+        signal
+            Reading of an ideal sensor of the motion (position or velocity), shape (ticks,).
+
+        Returns
+        -------
+        array
+            Position, velocity, force and command, shape (4, ticks), as in `move`.
+        """
         position = (
             np.cumsum(signal - np.mean(signal)) * self._period if self._integrated else signal
         )
         return self._inverse_dynamics(plant, position, 0.0)
 
     def _inverse_dynamics(self, plant: Plant, position: Array, error: float) -> Array:
+        """Return `move` of a prescribed position, m, whose standard error is `error`, m."""
         guide, inertia = self._parts(plant)
-        velocity = np.gradient(position, self._apart)
-        acceleration = np.gradient(velocity, self._apart)
+        velocity = np.gradient(position, self._interval)
+        acceleration = np.gradient(velocity, self._interval)
         out = np.zeros((4, len(position)))
         out[0], out[1] = position, velocity
+        # Nobody asks for the force: skip it.
         if all(row.kind in ("position", "velocity") for row in self.rows):
             return out
         motion = np.ascontiguousarray(np.stack([position, velocity, acceleration]))
@@ -324,7 +384,7 @@ class JointModel(Model[Plant]):
             dry_friction=friction(guide),
             inertia=inertia,
             spring=1.0 / softest,
-            period=self._apart,
+            period=self._interval,
             motion=motion,
             out=out[2],
         )
@@ -333,8 +393,11 @@ class JointModel(Model[Plant]):
     def _softest(
         self, guide: Guide, inertia: Inertia, position: Array, acceleration: Array, error: float
     ) -> float:
-        """Compliance, m/N, over which friction that reverses builds up: no less than what a
-        measured motion's error hides."""
+        """Return the compliance in series with dry friction, m/N.
+
+        The error of the measured motion hides smaller ones: friction that reverses builds up over
+        at least that distance.
+        """
         carried_load = inertia.mass * acceleration + guide.stiffness * (position - inertia.rest)
         load = float(np.sqrt(np.mean(carried_load**2)))
         size = max(friction_size(friction(guide), load), 1e-300)
@@ -342,16 +405,23 @@ class JointModel(Model[Plant]):
         return max(guide.compliance, ELASTIC * error / size, 1e-9 * stroke / size)
 
     def _integrate_pushed(
-        self, plant: Plant, mover: Pusher, besides: Array, noise: Array | None = None
+        self, plant: Plant, mover: Pusher, disturbance: Array, noise: Array | None = None
     ) -> Array:
-        """The joint under its actuator, from where it starts. besides: another force on it,
-        N, shape (ticks,); noise: of what a controller reads, shape (ticks, inputs)."""
-        return self._prepare_pushed(plant, mover, noise)(self._start_of(plant), besides)
+        """Return `move` of a pushed joint, shape (4, ticks).
+
+        `disturbance` is an unmodelled force, N, shape (ticks,). `noise` is that of the controller's
+        inputs, shape (ticks, inputs).
+        """
+        return self._prepare_pushed(plant, mover, noise)(self._start_of(plant), disturbance)
 
     def _prepare_pushed(
         self, plant: Plant, mover: Pusher, noise: Array | None = None
     ) -> Callable[[Start, Array], Array]:
-        """The same from any start, as a function of it and the other force."""
+        """Return a function that integrates the joint.
+
+        Its arguments are the initial state and a disturbance, N, shape (ticks,), whose length is
+        the number of ticks.
+        """
         guide, inertia = self._parts(plant)
         h = self._period / self._steps
         rigid = RIGID * inertia.mass / h**2
@@ -361,8 +431,8 @@ class JointModel(Model[Plant]):
         models = tuple(transducer(part, self._period) for part in parts)
         kinds = np.array([int(measures(part) == "velocity") for part in parts])
 
-        def integrate(start: Start, besides: Array) -> Array:
-            command = self._command[: len(besides)].copy()
+        def integrate(start: Start, disturbance: Array) -> Array:
+            command = self._command[: len(disturbance)].copy()
             out = np.zeros((4, len(command)))
             integrate_pushed(
                 guide=guide,
@@ -378,7 +448,7 @@ class JointModel(Model[Plant]):
                 kinds=kinds,
                 loop=self._loop(noise),
                 command=command,
-                besides=np.ascontiguousarray(besides),
+                disturbance=np.ascontiguousarray(disturbance),
                 period=self._period,
                 steps=self._steps,
                 out=out,
@@ -403,7 +473,7 @@ class JointModel(Model[Plant]):
             )
         names = [self._machine.components[name].channel for name in self._sensors]
         channels = [control.inputs[name] for name in control.formula.inputs]
-        which = np.array(
+        sensor_of_input = np.array(
             [names.index(channel) if channel in names else -1 for channel in channels], np.int64
         )
         return Loop(
@@ -413,18 +483,18 @@ class JointModel(Model[Plant]):
             memory=control.formula.memory(),
             recorded=self._recorded_inputs,
             noise=self._no_noise if noise is None else noise,
-            sensor=which,
+            sensor=sensor_of_input,
         )
 
     @cached_property
     def _recorded_inputs(self) -> Array:
-        """What the controller read, as recorded, shape (ticks, inputs)."""
+        """Recorded inputs of the controller, shape (ticks, inputs)."""
         control = self._control
         assert control is not None
-        found = np.zeros((self._signals.ticks, len(control.formula.inputs)))
+        recorded = np.zeros((self._signals.ticks, len(control.formula.inputs)))
         for number, name in enumerate(control.formula.inputs):
-            found[:, number] = self._signals.column(*control.inputs[name])
-        return found
+            recorded[:, number] = self._signals.column(*control.inputs[name])
+        return recorded
 
     @cached_property
     def _no_noise(self) -> Array:
@@ -438,11 +508,13 @@ class JointModel(Model[Plant]):
         return moved[[places[row.kind] for row in self.rows]]
 
     def _apply_sensors(self, plant: Plant, true: Array) -> Array:
-        found = true.copy()
+        sensed = true.copy()
         for number, row in enumerate(self.rows):
             if row.kind != "command":
-                found[number] = apply_sensor(getattr(plant, row.name), true[number], self._apart)
-        return limit_band(found, self.band, self._apart)
+                sensed[number] = apply_sensor(
+                    getattr(plant, row.name), true[number], self._interval
+                )
+        return limit_band(sensed, self.band, self._interval)
 
     def predict(self, plant: Plant) -> Array:
         return self._apply_sensors(plant, self.predict_true(plant))
@@ -452,9 +524,9 @@ class JointModel(Model[Plant]):
             return self._apply_sensors(plant, self._rows(self.move(plant, force=amount)))
         if entry == "motion":
             return self._apply_sensors(plant, self._rows(self.move(plant, shift=amount)))
-        found = self.predict(plant)
-        found[[row.name for row in self.rows].index(entry)] += amount
-        return found
+        predicted = self.predict(plant)
+        predicted[[row.name for row in self.rows].index(entry)] += amount
+        return predicted
 
     def components(self) -> tuple[str, ...]:
         replay = self._replay
@@ -482,7 +554,7 @@ class JointModel(Model[Plant]):
             )
         elif component in (self._replay.mass, self._replay.rotor):
             role = "mass"
-        return forms(role, entry, Passage(signal, moved[0], moved[1], moved[2], self._apart))
+        return forms(role, entry, Passage(signal, moved[0], moved[1], moved[2], self._interval))
 
     def disturbance_size(self, entry: str) -> float:
         moved = self.move(self._machine.plant)
@@ -495,14 +567,17 @@ class JointModel(Model[Plant]):
         moved = self.move(plant)
         force = moved[2]
         if not force.any():
-            # It swings freely: what acts on it is what its inertia shows.
+            # No actuator acts: the force is inertia times acceleration.
             _, inertia = self._parts(plant)
-            force = inertia.mass * np.gradient(moved[1], self._apart)
+            force = inertia.mass * np.gradient(moved[1], self._interval)
         return Motion(moved[0], moved[1], force)
 
     def missing_force(self, plant: Plant) -> Array | None:
-        """Where a sensor of its position sees a pushed joint: the force that its measured motion
-        takes, less its actuator's."""
+        """Return the residual force required to reproduce the measured motion, N, shape (ticks,).
+
+        It is the force by inverse dynamics less the actuator's. None unless a position sensor sees
+        a pushed joint.
+        """
         row = next((row for row in self.rows if row.kind == "position"), None)
         if row is None or not self._free:
             return None
@@ -526,7 +601,7 @@ class JointModel(Model[Plant]):
         )
         channel = self._mover.channel
         assert channel is not None
-        # As the actuator got it, in a closed loop too.
+        # The recorded command, in closed loop too: it is the one that moved the joint.
         commanded = np.ascontiguousarray(self._signals.column(*channel))
         conditioning = actuator(mover, plant.computer, self._period)
         command = np.zeros(len(position))
@@ -534,8 +609,11 @@ class JointModel(Model[Plant]):
         return taken - push_all(push_law(mover), command, position, velocity)
 
     def propagated_noise(self, plant: Plant) -> Array | None:
-        """What the noise of a measured motion makes of the force, or that of a controller's sensors
-        of its command."""
+        """Return the change of the predictions by the noise of the inputs, shape (rows, ticks).
+
+        For a prescribed motion, the noise of its sensor changes the force. In closed loop, the
+        noise of the controller's sensors changes the command.
+        """
         random = np.random.default_rng(SEED)
         ticks = self._signals.ticks
         if self._motion is not None and self._error > 0.0 and not self._integrated:
@@ -544,7 +622,7 @@ class JointModel(Model[Plant]):
             again, _ = smooth(self._motion + level * random.standard_normal(ticks), self._period)
             shift = (again - self._motion)[:: self.every]
             carried = self._rows(self.move(plant, shift=shift)) - self._rows(self.move(plant))
-            return limit_band(carried, self.band, self._apart)
+            return limit_band(carried, self.band, self._interval)
         control = self._control
         if control is None or not self._sensors:
             return None
@@ -556,7 +634,7 @@ class JointModel(Model[Plant]):
                 noise[:, number] = white_noise(column) * random.standard_normal(ticks)
         mover = getattr(plant, self._mover.name)
         disturbed = self._integrate_pushed(plant, mover, np.zeros(ticks), noise)
-        found = np.zeros((len(self.rows), ticks))
+        change = np.zeros((len(self.rows), ticks))
         commands = [row.kind == "command" for row in self.rows]
-        found[commands] = disturbed[3] - self.move(plant)[3]
-        return found
+        change[commands] = disturbed[3] - self.move(plant)[3]
+        return change

@@ -1,4 +1,4 @@
-"""Where a pushed joint is and how fast it goes when a recording starts, by a sensor of it."""
+"""Initial position and velocity of a pushed joint, from one of its sensors."""
 
 from __future__ import annotations
 
@@ -13,48 +13,60 @@ from rigtwin.numerics.arrays import Array, clip_diverged
 from rigtwin.signals.noise import smallest_step, white_noise
 
 SHOWS, FORGOTTEN = 10.0, 0.02
-"""χ² from which the error of a start shows, and share of its greatest effect below which it does no
-more."""
+"""χ² above which the error of an initial state is visible. Share of its greatest effect below which
+the effect counts as forgotten."""
 STRETCHES = (1 / 16, 1 / 4, 1.0)
-"""Shares of a record to which one start after another is fitted where no sensor sees the place,"""
+"""Growing shares of the recording to which the state is fitted where no sensor shows the
+position."""
 CLOSER = 0.1
-"""and how much less far off than the one before it each may be."""
+"""Factor on the tolerance of the position from one of these fits to the next."""
 AT_REST: Start = (0.0, 0.0)
 Move = Callable[[Start, Array], Array]
-"""Motion, its first rows position and velocity, from a start and under another force of shape
-(ticks,)."""
+"""Function of an initial state and a disturbance, N, shape (ticks,), that returns the motion. Its
+first rows are position and velocity."""
 
 
 def guess_place(velocity: Array, period: float) -> tuple[float, float]:
-    """Where what swings about 0 is at its start.
+    """Guess the initial position of an oscillation about zero from its velocity.
 
     Parameters
     ----------
     velocity
-        As measured, of a sensor of any zero that may drift, shape (ticks,).
+        Measured velocity, m/s, shape (ticks,). The sensor may have an offset and a drift.
     period
-        s, of a tick.
+        Time from tick to tick, s.
 
     Returns
     -------
     tuple
-        The place, and the swing's standard deviation.
+        Initial position and standard deviation of the position, m.
     """
-    from scipy.signal import detrend  # Late: it takes a second.
+    from scipy.signal import detrend  # Imported late: scipy is slow to load.
 
+    # An offset would integrate to a ramp, so the velocity is detrended first.
     swing = np.cumsum(detrend(velocity)) * period
     return float(swing[0] - np.mean(swing)), float(np.std(swing))
 
 
 class JointStart:
-    """Read from a sensor of position or velocity; fitted where an error of it shows.
+    """Initial state of a joint, read from a sensor and fitted where its error matters.
 
-    A sensor of velocity says nothing of where the joint is. What swings about a place is taken to
-    do so about 0, within the swing.
+    A velocity sensor says nothing about the position. The joint is then assumed to oscillate about
+    zero, and its initial position is fitted within that oscillation.
+
+    Parameters
+    ----------
+    name
+        Name of the sensor.
+    kind
+        Measured quantity: `position` or `velocity`.
+    measured
+        Measured signal, shape (ticks,).
+    period
+        Time from tick to tick, s.
     """
 
     def __init__(self, name: str, kind: str, measured: Array, period: float) -> None:
-        """name: of the sensor; kind: position or velocity; measured: shape (ticks,); period: s."""
         self.name = name
         self._row = ("position", "velocity").index(kind)
         self._measured, self._period = measured, period
@@ -69,7 +81,7 @@ class JointStart:
 
     @property
     def fitted(self) -> bool:
-        """Whether the error of a start shows."""
+        """Whether the error of the state as read is visible in the predictions."""
         return self._held > 0.0
 
     def _read(self, sensor: Sensor) -> Start:
@@ -79,32 +91,43 @@ class JointStart:
         return value, (self._slope - sensor.drift) / sensor.gain
 
     def judge(self, sensor: Sensor, move: Move, form: float, pushes: Array) -> None:
-        """Find whether the error of a start as it is read shows, and for how long. form: the error
-        of the machine's form, as a share of what the sensor reads; pushes: what is commanded."""
+        """Decide whether the error of the state as read is visible, and for how long.
+
+        Parameters
+        ----------
+        sensor
+            Nominal sensor.
+        move
+            Motion from any initial state.
+        form
+            Declared model error, as a share of the sensor's signal.
+        pushes
+            Command of the actuator, shape (ticks,).
+        """
         self._swings_freely = not float(np.ptp(pushes)) > 0.0
         held = max(form * float(np.std(self._measured)), self._noise)
         predict, first = self._predict_by(move, self._remembered), np.array(self._read(sensor))
-        other = first.copy()
-        other[1 - self._row] += self._error[1 - self._row]
-        change = predict(other) - predict(first)
+        displaced = first.copy()
+        displaced[1 - self._row] += self._error[1 - self._row]
+        change = predict(displaced) - predict(first)
         size = np.abs(change)
         self._remembered = 1 + int(np.nonzero(size >= FORGOTTEN * size.max())[0][-1])
         self._held = held if float(change @ change) > SHOWS * held**2 else 0.0
 
     def find(self, sensor: Sensor, move: Move | None) -> Start:
-        """The start as the sensor has it.
+        """Return the initial state.
 
         Parameters
         ----------
         sensor
-            Its values.
+            Sensor with its parameters.
         move
-            The machine from any start; None where nothing is to be fitted.
+            Motion from any initial state; None to take the state as read.
 
         Returns
         -------
         tuple
-            Position and velocity.
+            Position and velocity, m and m/s.
         """
         start = self._read(sensor)
         if move is None:
@@ -115,11 +138,13 @@ class JointStart:
         error = np.array(self._error)
         if self._row == 0:
             return self._fit(measured, move, first, error)
-        there = np.array([self._place / sensor.gain, start[1]])
+        guessed = np.array([self._place / sensor.gain, start[1]])
         predict = self._predict_by(move, self._remembered)
-        first = min((first, there), key=lambda each: float(np.sum((predict(each) - measured) ** 2)))
-        # A place that is guessed is too far off for the whole at once: a swing's pace depends on
-        # how wide it is.
+        first = min(
+            (first, guessed), key=lambda state: float(np.sum((predict(state) - measured) ** 2))
+        )
+        # A guessed position is too far off to fit the whole recording at once: the period of a
+        # nonlinear oscillation depends on its amplitude, so the phase error grows with time.
         for share in STRETCHES:
             stretch = measured[: max(math.ceil(share * len(measured)), 2)]
             first = np.array(self._fit(stretch, move, first, error))
@@ -128,18 +153,18 @@ class JointStart:
 
     def _fit(self, measured: Array, move: Move, first: Array, error: Array) -> Start:
         predict = self._predict_by(move, len(measured))
-        here = predict(first)
-        slopes = find_slopes(predict, first, error, here)
+        predicted = predict(first)
+        slopes = find_slopes(predict, first, error, predicted)
         held = self._held
         if not self._swings_freely:
-            # A model that is far off elsewhere too is no reason to start otherwise. What nothing
-            # else moves has all its motion from its start, and from how it was let go.
-            held = max(held, float(np.sqrt(np.mean((here - measured) ** 2))))
-        found = fit_start(predict, measured, first, error, held, slopes, here)
-        return float(found[0]), float(found[1])
+            # A wrong model must not be blamed on the initial state: its residual widens the
+            # tolerance. Not so for a free oscillation, whose whole motion comes from its start.
+            held = max(held, float(np.sqrt(np.mean((predicted - measured) ** 2))))
+        state = fit_start(predict, measured, first, error, held, slopes, predicted)
+        return float(state[0]), float(state[1])
 
     def _predict_by(self, move: Move, ticks: int) -> Callable[[Array], Array]:
-        """What the sensor sees from any start, for so many ticks."""
+        """Return a function that predicts the sensor from an initial state, for some ticks."""
 
         def predict(start: Array) -> Array:
             moved = move((float(start[0]), float(start[1])), np.zeros(ticks))

@@ -1,4 +1,4 @@
-"""Runs a test on the twin of a described machine, into a recording."""
+"""Test of a described machine's twin: simulate it and write the recording."""
 
 from __future__ import annotations
 
@@ -13,11 +13,9 @@ from rigtwin.description.configuration import Configuration, flatten
 from rigtwin.description.control import FormulaControl
 from rigtwin.description.effects import apply_effects
 from rigtwin.description.limits import Tripped, find_trip, require_order
-from rigtwin.description.machine import OWN, Machine
+from rigtwin.description.machine import OWN, Machine, ReplayOf
 from rigtwin.errors import RigtwinError
-from rigtwin.models.carried_twin import carry
 from rigtwin.models.commanding import Command, Tick, command_by_formula, command_by_function
-from rigtwin.models.coupled_twin import list_parts, move_commanded, move_freely
 from rigtwin.models.demands import (
     Columns,
     check_demands,
@@ -25,7 +23,9 @@ from rigtwin.models.demands import (
     list_sensors,
     list_wanted,
 )
-from rigtwin.models.moved_twin import move_together
+from rigtwin.models.forward_twin import list_parts, simulate_controlled, simulate_forward
+from rigtwin.models.inverse_twin import SimulatedSignals, simulate_prescribed
+from rigtwin.models.joint_twin import simulate_joint
 from rigtwin.models.reading import make_noise, round_reading, sensors_of
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Writer
@@ -33,7 +33,7 @@ from rigtwin.simulation.runner import RunResult
 
 
 class RunsAway(RigtwinError):
-    """A machine that went where nothing can, and met no limit on its way."""
+    """Error of a simulated motion that diverges without meeting a limit."""
 
 
 def run_machine(
@@ -47,58 +47,63 @@ def run_machine(
     effects: Sequence[str] = (),
     controller: Tick | None = None,
 ) -> RunResult:
-    """Runs a test on the twin of a described machine into a new recording.
+    """Run a test on the twin of a described machine into a new recording.
 
     Parameters
     ----------
     path
-        Of the recording.
+        File of the recording.
     machine
-        Its description.
+        Description of the machine.
     experiment
-        The test's name.
+        Name of the test.
     configuration
-        What the operator knows.
+        Settings as the operator knows them; they are stored in the recording.
     demands
         Field, or topic.field, of each demanded channel → its values, shape (ticks,).
     seed
-        Of the sensors' noise.
+        Seed of the sensors' noise.
     effects
-        That the machine has and the operator does not know of, as `--effect` takes them.
+        Hidden effects: simulated, but not stored in the recording's settings.
     controller
-        That commands the machine's actuators instead of the described one.
+        Controller of the user. Default: the described one.
 
     Returns
     -------
     RunResult
-        How it went.
+        Path, number of ticks and reason of the end.
 
     Raises
     ------
     RigtwinError
-        Before anything is written, if a demand is missing or not a number, or an effect is unknown.
+        If a demand is missing or not a number, or an effect is unknown. Nothing is written then.
     """
+    # Simulate first: a test that is refused must not touch an existing recording.
     actual = apply_effects(configuration, effects)
     columns, trip = simulate_machine(machine, actual, demands, seed, controller)
     ticks = next(len(signal) for names in columns.values() for signal in names.values())
     settings = flatten(configuration)
-    told = settings.get("controller", {}) if controller is None else {OWN: True}
+    controller_values = settings.get("controller", {}) if controller is None else {OWN: True}
     fields = {topic: tuple(names) for topic, names in columns.items()}
     period = configuration.timing.period
     reason = FINISHED if trip is None else trip.reason
     described = own_description(machine)
-    with Writer(path, experiment, period, told, machine.name, fields, described) as writer:
+    with Writer(
+        path, experiment, period, controller_values, machine.name, fields, described
+    ) as writer:
         writer.add_twin(seed, settings, tuple(effects), __version__)
-        tables = {
-            topic.strip("/"): np.column_stack(list(names.values()))
-            for topic, names in columns.items()
-        }
-        for first in range(0, ticks, BLOCK):
-            writer.append(
-                **{topic: table[first : first + BLOCK] for topic, table in tables.items()}
-            )
+        _write_columns(writer, columns, ticks)
         writer.finish(reason)
     return RunResult(path, ticks, reason, trip is not None)
+
+
+def _write_columns(writer: Writer, columns: Columns, ticks: int) -> None:
+    """Write all signals of a test in blocks of ticks."""
+    tables = {
+        topic.strip("/"): np.column_stack(list(names.values())) for topic, names in columns.items()
+    }
+    for first in range(0, ticks, BLOCK):
+        writer.append(**{topic: table[first : first + BLOCK] for topic, table in tables.items()})
 
 
 def simulate_machine(
@@ -108,86 +113,127 @@ def simulate_machine(
     seed: int,
     controller: Tick | None = None,
 ) -> tuple[Columns, Tripped | None]:
-    """Runs a test on the twin of a described machine in memory.
+    """Simulate a test of a described machine in memory.
 
     Parameters
     ----------
     machine
-        Its description.
+        Description of the machine.
     configuration
-        What it is, effects included.
+        Settings of the test, with the effects applied.
     demands, seed, controller
-        As of `run_machine`.
+        Demands, seed of the noise and controller, as in `run_machine`.
 
     Returns
     -------
     tuple
-        Topic → field → signal, until the test was over, and which of its limits ended it early, if
-        one did.
+        Topic → field → signal up to the end of the test, and the limit that ended it early, or
+        None.
 
     Raises
     ------
     RigtwinError
-        If a demand is missing or not a number, or the machine runs away without meeting a limit.
+        If a demand is missing or not a number, or the motion diverges without meeting a limit.
     """
     require_order(machine, configuration)
     wanted, outputs = list_wanted(machine, demands, controller)
     columns = check_demands(machine, wanted, demands)
     signals = [signal for names in columns.values() for signal in names.values()]
     ticks = len(signals[0]) if signals else configuration.ticks
+    # The second number separates this stream of random numbers from others of the same seed.
     random = np.random.default_rng([seed, 3])
     plant, period = configuration.plant, configuration.timing.period
     noise = {name: make_noise(plant, name, ticks, period, random) for name in sensors_of(machine)}
-    movers = list_movers(machine)
-    given = {
-        name: columns[channel[0]][channel[1]]
-        for name, channel in movers.items()
-        if name not in outputs
-    }
     command: Command | None = None
     if controller is not None:
         command = command_by_function(controller, columns)
     elif outputs:
         command = command_of(machine, configuration, columns)
-    away: list[str] = []
+    diverged = _simulate_parts(machine, configuration, columns, outputs, command, noise, ticks)
+    trip = find_trip(machine, configuration, columns)
+    if diverged and trip is None:
+        joints = ", ".join(diverged)
+        raise RunsAway(f"{machine.name}: {joints}: diverged: no restoring force or limit")
+    return columns if trip is None else _cut_columns(columns, trip.tick + 1), trip
+
+
+def _simulate_parts(
+    machine: Machine,
+    configuration: Configuration,
+    columns: Columns,
+    outputs: Sequence[str],
+    command: Command | None,
+    noise: Mapping[str, Array],
+    ticks: int,
+) -> list[str]:
+    """Simulate all parts of a machine one by one and add their readings to `columns`.
+
+    Returns the names of the joints whose motion diverged.
+    """
+    demanded = {
+        name: columns[channel[0]][channel[1]]
+        for name, channel in list_movers(machine).items()
+        if name not in outputs
+    }
+    diverged: list[str] = []
     for replay in list_parts(machine):
-        mine = {name: given[name] for name in replay.moved_by if name in given}
+        part_demands = {name: demanded[name] for name in replay.moved_by if name in demanded}
         if replay.free and command is not None:
-            own = [name for name in outputs if name in replay.moved_by]
-            moved = move_commanded(machine, replay, configuration, mine, own, command, noise, ticks)
-        elif replay.free:
-            moved = move_freely(machine, replay, configuration, mine)
-        elif len(replay.moved_by) > 1:
-            moved = move_together(machine, configuration, mine)
+            part_outputs = [name for name in outputs if name in replay.moved_by]
+            moved = simulate_controlled(
+                machine, replay, configuration, part_demands, part_outputs, command, noise, ticks
+            )
         else:
-            moved = carry(machine, replay, configuration, mine)
+            moved = _simulate_open_loop(machine, replay, configuration, part_demands)
         if not moved.sound:
-            away += replay.free or (machine.name,)
+            diverged += replay.free or (machine.name,)
         for name, signal in moved.signals.items():
             channel = machine.components[name].channel
             assert channel is not None
-            whole = name in moved.whole
-            reading = signal if whole else round_reading(plant, name, signal + noise[name])
+            reading = signal
+            # The readings of a controller have their noise already: it acted in the loop.
+            if name not in moved.whole:
+                reading = round_reading(configuration.plant, name, signal + noise[name])
             columns.setdefault(channel[0], {})[channel[1]] = reading
-    trip = find_trip(machine, configuration, columns)
-    if away and trip is None:
-        raise RunsAway(f"{machine.name}: {', '.join(away)}: runs away; nothing holds it")
-    if trip is not None:
-        columns = {
-            topic: {name: signal[: trip.tick + 1] for name, signal in names.items()}
-            for topic, names in columns.items()
-        }
-    return columns, trip
+    return diverged
+
+
+def _simulate_open_loop(
+    machine: Machine, replay: ReplayOf, configuration: Configuration, demands: dict[str, Array]
+) -> SimulatedSignals:
+    """Simulate one part of a machine whose commands are all known beforehand."""
+    if replay.free:
+        return simulate_forward(machine, replay, configuration, demands)
+    if len(replay.moved_by) > 1:
+        return simulate_prescribed(machine, configuration, demands)
+    return simulate_joint(machine, replay, configuration, demands)
+
+
+def _cut_columns(columns: Columns, ticks: int) -> Columns:
+    """Return the first ticks of all signals."""
+    return {
+        topic: {name: signal[:ticks] for name, signal in names.items()}
+        for topic, names in columns.items()
+    }
 
 
 BLOCK = 250
-"""Ticks that are written at a time."""
+"""Number of ticks that are written at a time."""
 FINISHED = "completed"
 
 
 def command_of(machine: Machine, configuration: Configuration, columns: Columns) -> Command:
-    """The described controller of a machine. columns: what is demanded, topic → field → signal,
-    shape (ticks,)."""
+    """Return the described controller of a machine, for a loop that advances tick by tick.
+
+    Parameters
+    ----------
+    machine
+        Description of the machine.
+    configuration
+        Settings of the test, with those of the controller.
+    columns
+        Demands of the test: topic → field → signal, shape (ticks,).
+    """
     control = machine.control
     assert isinstance(control, FormulaControl)
     read = {name: machine.components[name].channel for name in list_sensors(machine)}

@@ -1,8 +1,10 @@
-"""The bodies of an MJCF as joints that act on each other feel them: inertia matrix and the forces
-of gravity and of velocities, by MuJoCo, at any motion.
+"""Rigid bodies of an MJCF in the coordinates of the joints that move, by MuJoCo.
 
-Coordinates are those of the joints that move. A joint that an equality ties to one of them goes
-with it; all others stay where the MJCF has them.
+They give the inertia matrix M(q) and the bias c(q, q'), that is gravity, Coriolis and centrifugal
+forces less passive ones, of the equation of motion M·q'' + c = τ.
+
+A joint that an equality ties to a coordinate moves with it. All other joints stay where the MJCF
+has them.
 """
 
 from __future__ import annotations
@@ -22,53 +24,54 @@ from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import fwd_position, fwd_velocity, kernel
 
 UNCHANGED = 1e-9
-"""Share of its size by which an inertia matrix that is the same everywhere may differ."""
+"""Relative variation below which inertia matrix and bias count as constant."""
 PLACES = 5
-"""Places at which that is looked for."""
+"""Random states at which that is tested."""
 
 
 class Bodies(NamedTuple):
-    """What compiled code needs of them. model, data: addresses of MuJoCo's; places, dofs: of the
-    joints that move, in its vectors; ties: how far each of them goes for each coordinate's unit,
-    shape (joints, coordinates), from `base`; qpos, qvel, bias, passive: its vectors; entries,
-    columns, first, entered: its inertia matrix, a row's entries; added: inertia besides, of what
-    turns with the motors, shape (coordinates, coordinates); steady: whether inertia and bias are
-    the same everywhere; inertia, constant: then they are these, `added` not among them."""
+    """Rigid bodies as compiled code takes them.
 
-    model: int
-    data: int
-    places: np.ndarray
-    dofs: np.ndarray
-    ties: Array
-    base: Array
-    qpos: Array
-    qvel: Array
-    bias: Array
-    passive: Array
-    entries: Array
-    columns: np.ndarray
-    first: np.ndarray
-    entered: np.ndarray
-    added: Array
-    steady: bool
-    inertia: Array
-    constant: Array
+    The position of each moving joint is `base + ties · q`, with the coordinates q. MuJoCo stores
+    its inertia matrix sparsely: the lower triangle row by row.
+    """
+
+    model: int  # Address of MuJoCo's model.
+    data: int  # Address of MuJoCo's data.
+    places: np.ndarray  # Indices of the moving joints in `qpos`, shape (joints,).
+    dofs: np.ndarray  # Indices of the moving joints in `qvel`, shape (joints,).
+    ties: Array  # Motion of each joint for a unit of each coordinate, shape (joints, coordinates).
+    base: Array  # Position of each joint at zero coordinates, shape (joints,).
+    qpos: Array  # MuJoCo's positions.
+    qvel: Array  # MuJoCo's velocities.
+    bias: Array  # MuJoCo's gravity, Coriolis and centrifugal forces.
+    passive: Array  # MuJoCo's springs and dampers that no component describes.
+    entries: Array  # Entries of MuJoCo's sparse inertia matrix.
+    columns: np.ndarray  # Column of each entry.
+    first: np.ndarray  # Index of each row's first entry.
+    entered: np.ndarray  # Number of entries in each row.
+    added: Array  # Inertia of the rotors, shape (coordinates, coordinates).
+    steady: bool  # Whether inertia and bias are the same in every state.
+    inertia: Array  # Constant inertia matrix without `added`, used if `steady`.
+    constant: Array  # Constant bias, used if `steady`.
 
 
 @kernel
 def find_terms(bodies: Bodies, place: Array, speed: Array, inertia: Array, bias: Array) -> None:
-    """Inertia matrix and bias of the coordinates.
+    """Compute inertia matrix and bias: force = inertia · acceleration + bias.
 
     Parameters
     ----------
     bodies
-        That move.
+        Rigid bodies.
     place, speed
-        Of the coordinates, shape (coordinates,).
-    inertia, bias
-        Written here, shape (coordinates, coordinates) and (coordinates,): force = inertia ·
-        acceleration + bias.
+        Positions and velocities of the coordinates, m and m/s, shape (coordinates,).
+    inertia
+        Inertia matrix, written, kg, shape (coordinates, coordinates).
+    bias
+        Bias, written, N, shape (coordinates,).
     """
+    # Constant terms need no call of MuJoCo.
     if bodies.steady:
         inertia[:] = bodies.inertia + bodies.added
         bias[:] = bodies.constant
@@ -76,36 +79,39 @@ def find_terms(bodies: Bodies, place: Array, speed: Array, inertia: Array, bias:
     size = len(place)
     for joint in range(len(bodies.dofs)):
         at, rate = bodies.base[joint], 0.0
-        for own in range(size):
-            at += bodies.ties[joint, own] * place[own]
-            rate += bodies.ties[joint, own] * speed[own]
+        for coordinate in range(size):
+            at += bodies.ties[joint, coordinate] * place[coordinate]
+            rate += bodies.ties[joint, coordinate] * speed[coordinate]
         bodies.qpos[bodies.places[joint]] = at
         bodies.qvel[bodies.dofs[joint]] = rate
+    # Position before velocity: MuJoCo's velocity stage uses the kinematics of the position stage.
     fwd_position(bodies.model, bodies.data)
     fwd_velocity(bodies.model, bodies.data)
+    # Project on the coordinates: M_q = Tᵀ M T and c_q = Tᵀ c, with the ties T.
     inertia[:] = bodies.added
     bias[:] = 0.0
     for joint in range(len(bodies.dofs)):
         row = bodies.dofs[joint]
         force = bodies.bias[row] - bodies.passive[row]
-        for own in range(size):
-            bias[own] += bodies.ties[joint, own] * force
+        for coordinate in range(size):
+            bias[coordinate] += bodies.ties[joint, coordinate] * force
         start = bodies.first[row]
         for entry in range(start, start + bodies.entered[row]):
             value = bodies.entries[entry]
-            for other in range(len(bodies.dofs)):
-                if bodies.dofs[other] != bodies.columns[entry]:
+            for second in range(len(bodies.dofs)):
+                if bodies.dofs[second] != bodies.columns[entry]:
                     continue
                 for i in range(size):
                     for j in range(size):
-                        both = bodies.ties[joint, i] * bodies.ties[other, j]
-                        if other != joint:
-                            both += bodies.ties[other, i] * bodies.ties[joint, j]
-                        inertia[i, j] += both * value
+                        product = bodies.ties[joint, i] * bodies.ties[second, j]
+                        # Only the lower triangle is stored: add the mirrored entry.
+                        if second != joint:
+                            product += bodies.ties[second, i] * bodies.ties[joint, j]
+                        inertia[i, j] += product * value
 
 
 def inertia_at(bodies: Bodies, place: Array) -> Array:
-    """The inertia matrix at a place, shape (coordinates, coordinates)."""
+    """Return the inertia matrix at a position, kg, shape (coordinates, coordinates)."""
     size = len(place)
     inertia, bias = np.empty((size, size)), np.empty(size)
     find_terms(bodies, place, np.zeros(size), inertia, bias)
@@ -113,8 +119,24 @@ def inertia_at(bodies: Bodies, place: Array) -> Array:
 
 
 class Multibody:
-    """The bodies without what the description's components stand for: friction, springs and rotors
-    of joints and tendons. No contacts, no stops."""
+    """Rigid bodies without the friction, springs and rotors that components describe.
+
+    Contacts, joint limits and actuators of the MJCF are switched off.
+
+    Parameters
+    ----------
+    path
+        MJCF of the machine.
+    joints
+        Joints whose positions are the coordinates.
+    guides, rotors
+        Components whose friction, springs and inertia are modelled elsewhere.
+
+    Raises
+    ------
+    RigtwinError
+        If the MJCF cannot be read.
+    """
 
     def __init__(
         self,
@@ -123,75 +145,77 @@ class Multibody:
         guides: Sequence[Component],
         rotors: Sequence[Component],
     ) -> None:
-        """joints: whose positions are the coordinates; guides, rotors: components that are worked
-        out elsewhere. Raises RigtwinError if the model cannot be read."""
         self._path, self._guides, self._rotors = path, guides, rotors
         mechanism = Mechanism(path)
         self._model = self._prepare(mechanism.model)
         names = list(joints)
         ties, base = np.eye(len(joints)), np.zeros(len(joints))
-        for tie in mechanism.ties_of(joints)[0]:
-            place = names.index(tie.to)
-            ties = np.vstack([ties, tie.ratio * ties[place]])
-            base = np.append(base, tie.apart + tie.ratio * base[place])
-            names.append(tie.joint)
+        # A tied joint moves by ratio · coordinate + offset; ties of ties follow from their order.
+        for tie in mechanism.ties():
+            if tie.to in names and tie.joint not in names:
+                place = names.index(tie.to)
+                ties = np.vstack([ties, tie.ratio * ties[place]])
+                base = np.append(base, tie.apart + tie.ratio * base[place])
+                names.append(tie.joint)
         self._ties, self._from, self._tied = ties, base, names
         self._numbers = [mechanism.number("joint", name) for name in names]
         self.coordinates = len(joints)
         self._find_steady()
 
     def express(self, acts_on: Sequence[tuple[str, float]]) -> Array:
-        """A coordinate that goes so far for each unit of some joints, by those that are free to
-        move: shape (coordinates,)."""
-        found = np.zeros(self.coordinates)
+        """Return the direction of a component in the coordinates, shape (coordinates,).
+
+        `acts_on` lists joints and coefficients, as a fixed tendon does.
+        """
+        direction = np.zeros(self.coordinates)
         for joint, coefficient in acts_on:
             if joint in self._tied:
-                found += coefficient * self._ties[self._tied.index(joint)]
-        return found
+                direction += coefficient * self._ties[self._tied.index(joint)]
+        return direction
 
     def measure(self, acts_on: Sequence[tuple[str, float]]) -> float:
-        """Where that coordinate is while all others are at zero."""
-        found = 0.0
+        """Return the position of a component at zero coordinates, m or rad."""
+        position = 0.0
         for joint, coefficient in acts_on:
             if joint in self._tied:
-                found += coefficient * float(self._from[self._tied.index(joint)])
+                position += coefficient * float(self._from[self._tied.index(joint)])
             else:
                 number = self._model.joint(joint).id
-                found += coefficient * float(self._model.qpos0[self._model.jnt_qposadr[number]])
-        return found
+                position += coefficient * float(self._model.qpos0[self._model.jnt_qposadr[number]])
+        return position
 
     def rest_of(self, component: Component) -> float:
-        """Where the spring of a joint or a tendon is slack, along its own coordinate."""
+        """Return the position at which the spring of a joint or tendon is slack, m or rad."""
         model = self._model
         if component.element == "tendon":
             return float(np.mean(model.tendon_lengthspring[model.tendon(component.mjcf).id]))
         return float(model.qpos_spring[model.jnt_qposadr[model.joint(component.mjcf).id]])
 
     def place(self) -> Array:
-        """Where the MJCF has the coordinates, shape (coordinates,)."""
+        """Return the positions of the coordinates in the MJCF, m or rad, shape (coordinates,)."""
         at = self._model.jnt_qposadr[self._numbers[: self.coordinates]]
         return np.array(self._model.qpos0[at])
 
     def list_nominal(self, name: str) -> tuple[float, Array, Array]:
-        """What the MJCF says of a body alone."""
+        """Return mass, centre of mass and inertia of a body in the MJCF; see `rigid`."""
         return list_nominal(self._model, name)
 
     def change(
         self, parameters: Mapping[str, Array], gravity: Callable[[Array], Array] | None
     ) -> Multibody:
-        """The same with other bodies.
+        """Return a copy with changed bodies or gravity.
 
         Parameters
         ----------
         parameters
-            Body → its ten inertial parameters, as `components.body.INERTIAL`, shape (10,).
+            Body → its ten inertial parameters, as in `components.body.INERTIAL`, shape (10,).
         gravity
-            What becomes of gravity, m/s², shape (3,).
+            Function that turns gravity, m/s², shape (3,); None to leave it as it is.
 
         Returns
         -------
         Multibody
-            With these.
+            Bodies with these parameters.
         """
 
         turned = np.empty(4)
@@ -199,6 +223,8 @@ class Multibody:
         def alter(spec: mujoco.MjSpec) -> None:
             for name, (mass, mx, my, mz, *moments) in parameters.items():
                 body, centre = spec.body(name), np.array([mx, my, mz]) / mass
+                # MuJoCo wants principal moments about the centre of mass: parallel axes, then
+                # eigenvalues, with axes that form a right-handed frame.
                 shifted = mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
                 about = arrange_moments(moments) - shifted
                 principal, axes = np.linalg.eigh(about)
@@ -206,22 +232,24 @@ class Multibody:
                 mujoco.mju_mat2Quat(turned, np.ascontiguousarray(axes).ravel())
                 body.explicitinertial = True
                 body.mass, body.ipos, body.iquat = mass, centre, turned
-                # A rounding below nothing is nothing.
+                # Rounding may leave a moment of zero slightly negative, which MuJoCo refuses.
                 body.inertia = np.maximum(principal, 1e-15)
                 body.fullinertia = np.full(6, np.nan)
             if gravity is not None:
                 spec.option.gravity = gravity(np.array(spec.option.gravity))
 
-        found = copy(self)
-        found._model = self._prepare(compile_model(self._path, alter))
-        found._find_steady()
-        return found
+        changed = copy(self)
+        changed._model = self._prepare(compile_model(self._path, alter))
+        changed._find_steady()
+        return changed
 
     def scale(self, shares: Mapping[str, float]) -> Multibody:
-        """The same with bodies that are so many times as heavy. shares: of all that each joint
-        carries."""
-        found = copy(self)
-        found._model = model = copy(self._model)
+        """Return a copy with scaled masses.
+
+        `shares` maps a joint to the factor on mass and inertia of all bodies that it carries.
+        """
+        scaled = copy(self)
+        scaled._model = model = copy(self._model)
         for joint, share in shares.items():
             carried = [int(model.jnt_bodyid[model.joint(joint).id])]
             for body in range(carried[0] + 1, model.nbody):
@@ -230,42 +258,45 @@ class Multibody:
             model.body_mass[carried] *= share
             model.body_inertia[carried] *= share
         mujoco.mj_setConst(model, mujoco.MjData(model))
-        found._find_steady()
-        return found
+        scaled._find_steady()
+        return scaled
 
     def _prepare(self, model: mujoco.MjModel) -> mujoco.MjModel:
         model.opt.disableflags |= (
             mujoco.mjtDisableBit.mjDSBL_CONSTRAINT | mujoco.mjtDisableBit.mjDSBL_ACTUATION
         )
         strip(model, self._guides, self._rotors)
-        # Bodies that move simply have an inertia of their own there, worked out beforehand.
+        # MuJoCo precomputes the inertia of simple bodies; it has to be told of the changes.
         mujoco.mj_setConst(model, mujoco.MjData(model))
         return model
 
     def _find_steady(self) -> None:
-        """Whether inertia and bias are the same wherever the joints are and however they go."""
+        """Remember inertia and bias if they are the same in every state."""
         random = np.random.default_rng(PLACES)
         size = self.coordinates
         self._steady: Array | None = None
-        found = []
+        samples = []
         data = self.data()
         bodies = self.bodies(data)
         for _ in range(PLACES):
             inertia, bias = np.empty((size, size)), np.empty(size)
             place, speed = random.uniform(-1.0, 1.0, size), random.uniform(-1.0, 1.0, size)
             find_terms(bodies, place, speed, inertia, bias)
-            found.append(np.column_stack([inertia, bias]))
-        apart = np.max(np.ptp(np.stack(found), axis=0))
-        if apart <= UNCHANGED * np.max(np.abs(found[0])):
-            self._steady = found[0]
+            samples.append(np.column_stack([inertia, bias]))
+        spread = np.max(np.ptp(np.stack(samples), axis=0))
+        if spread <= UNCHANGED * np.max(np.abs(samples[0])):
+            self._steady = samples[0]
 
     def data(self) -> mujoco.MjData:
-        """MuJoCo's own for these bodies, of one caller alone."""
+        """Return new MuJoCo data for these bodies, which one caller must not share with another."""
         return mujoco.MjData(self._model)
 
     def bodies(self, data: mujoco.MjData, added: Array | None = None) -> Bodies:
-        """For compiled code, which knows data by its address only: keep it for as long. added:
-        inertia besides, shape (coordinates, coordinates)."""
+        """Return the bodies as compiled code takes them.
+
+        Compiled code knows `data` by its address only: the caller keeps it alive. `added` is the
+        inertia of rotors, kg, shape (coordinates, coordinates).
+        """
         model, size, steady = self._model, self.coordinates, self._steady
         return Bodies(
             model=model._address,
@@ -290,6 +321,6 @@ class Multibody:
 
 
 def arrange_moments(moments: Sequence[float]) -> Array:
-    """The matrix of ixx, iyy, izz, ixy, ixz, iyz."""
+    """Return the inertia matrix of the moments ixx, iyy, izz, ixy, ixz, iyz, shape (3, 3)."""
     xx, yy, zz, xy, xz, yz = moments
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])

@@ -1,11 +1,9 @@
-"""The plant from its commands to its sensors, without MuJoCo: one degree of freedom, fast enough to
-search with.
+"""Fast model of the suspension rig as a quarter car: from commands to readings, without MuJoCo.
 
-The carriage is all that moves freely; both plates are prescribed by their cylinders, and the rod
-has no inertia. So one scalar inclusion a step, solved exactly, replaces the simulator: rail and
-motor friction are set-valued. What depends on the effects (actuators, cylinders, breakaway,
-sensors) is the twin's own code; tests hold it against the twin.
-How it moves is in `quarter_car_motion`.
+The carriage is the only free body. Both plates are prescribed by their cylinders, and the rod has
+no inertia. One scalar inclusion per step, solved exactly, therefore replaces the simulator: rail
+and motor friction are set-valued. The equation of motion is in `quarter_car_motion`. Actuators,
+cylinders, breakaway and sensors are the twin's own functions, and tests hold the model to the twin.
 """
 
 from __future__ import annotations
@@ -40,14 +38,14 @@ COMPONENTS = (
     "structure_cylinder",
     *Measurements._fields,
 )
-"""Components that are disturbed in turn."""
+"""Components on which an unknown input may act."""
 DISTURBANCE_SIZE = {"m": 1e-4, "N": 4.0}
-"""rms of each disturbance as tried; its response is taken as in proportion to it."""
+"""rms of a trial disturbance. Its response is assumed to be proportional to it."""
 KEPT = 64
-"""Motions of plates that are kept."""
+"""Number of remembered motions of plates."""
 
 KEPT_MOTIONS = 7
-"""Motions of the whole plant that are kept."""
+"""Number of remembered motions of the whole plant."""
 MECHANICAL = (
     "carriage",
     "rail",
@@ -62,18 +60,28 @@ MECHANICAL = (
 
 
 class Disturbances(NamedTuple):
-    """What acts on a plant besides its commands, shape (ticks,) each: motions of the plates m,
-    voltage V, force on the carriage N."""
+    """Unmodelled inputs of the plant, which add to its commands."""
 
-    ground: Array
-    structure: Array
-    voltage: Array
-    force: Array
+    ground: Array  # Motion of the ground plate, m, shape (ticks,).
+    structure: Array  # Motion of the structure plate, m, shape (ticks,).
+    voltage: Array  # Voltage of the motor's amplifier, V, shape (ticks,).
+    force: Array  # Force on the carriage, N, shape (ticks,).
 
 
 class QuarterCarModel(Model[RigPlant]):
-    """The plant under the commands of one test. Plates' motions are kept: most candidates leave
-    them as they are."""
+    """Model of the suspension rig under the commands of one test.
+
+    Parameters
+    ----------
+    ground, structure
+        Commands of the cylinders, m, shape (ticks,).
+    voltage
+        Command of the motor, V, shape (ticks,).
+    configuration
+        Settings of the test.
+    steps
+        Integration steps per tick.
+    """
 
     def __init__(
         self,
@@ -83,8 +91,6 @@ class QuarterCarModel(Model[RigPlant]):
         configuration: Configuration,
         steps: int,
     ) -> None:
-        """ground, structure: commands m; voltage: V; shape (ticks,). steps: of integration a
-        tick."""
         self._ground, self._structure, self._voltage = (
             np.ascontiguousarray(c) for c in (ground, structure, voltage)
         )
@@ -99,14 +105,29 @@ class QuarterCarModel(Model[RigPlant]):
 
     @classmethod
     def of(cls, inputs: Inputs, configuration: Configuration, steps: int) -> QuarterCarModel:
-        """Under the commands of a recording. Raises RigtwinError if one is missing."""
+        """Return the model under the commands of a recording.
+
+        Parameters
+        ----------
+        inputs
+            Recorded signals.
+        configuration
+            Settings of the test.
+        steps
+            Integration steps per tick.
+
+        Raises
+        ------
+        RigtwinError
+            If a command is missing from the recording.
+        """
         ground, structure, voltage = (
             inputs.column("/command", name) for name in ("ground", "structure", "voltage")
         )
         return cls(ground, structure, voltage, configuration, steps)
 
     def halve_steps(self) -> QuarterCarModel:
-        """The same with half as many steps."""
+        """Return the model with half the integration steps."""
         return QuarterCarModel(
             self._ground,
             self._structure,
@@ -116,7 +137,7 @@ class QuarterCarModel(Model[RigPlant]):
         )
 
     def double_steps(self) -> QuarterCarModel:
-        """The same with twice as many steps."""
+        """Return the model with twice the integration steps."""
         return QuarterCarModel(
             self._ground, self._structure, self._voltage, self._configuration, 2 * self._steps
         )
@@ -127,50 +148,59 @@ class QuarterCarModel(Model[RigPlant]):
         computer: Computer,
         commands: Array,
         start: float,
-        at: float | None,
+        position: float | None,
     ) -> Plate:
+        # Most candidates leave the cylinders as they are, so the plates' motions are remembered.
+        # A plate's yielding depends on its load and is left to the carriage's motion.
         unloaded = cylinder._replace(compliance=0.0, yield_lag=0.0, zero_load=0.0)
-        key = (unloaded, computer.delay, id(commands), at)
-        found = self._plates.get(key)
-        if found is None:
+        key = (unloaded, computer.delay, id(commands), position)
+        plate = self._plates.get(key)
+        if plate is None:
             if len(self._plates) > KEPT:
                 self._plates.clear()
-            found = move_plate(
+            plate = move_plate(
                 cylinder=unloaded,
                 computer=computer,
                 commands=commands,
                 start=start,
-                at=at,
+                at=position,
                 timestep=self._period / self._steps,
                 steps=self._steps,
             )
-            self._plates[key] = found
-        return found
+            self._plates[key] = plate
+        return plate
 
-    def predict_true(self, plant: RigPlant, besides: Disturbances | None = None) -> Array:
-        """What ideal sensors would read, rows as in Measurements, shape (4, ticks). besides: what
-        acts on the plant that it does not know."""
+    def predict_true(self, plant: RigPlant, disturbances: Disturbances | None = None) -> Array:
+        """Return what ideal sensors would read, rows as in `Measurements`, shape (4, ticks).
+
+        Parameters
+        ----------
+        plant
+            Parameters of the rig.
+        disturbances
+            Unmodelled inputs. Default: none.
+        """
         timestep = self._period / self._steps
         ground = self._plate(
             plant.ground_cylinder, plant.computer, self._ground, float(self._ground[0]), None
         )
-        # The spring is uncompressed at the start, the tyre carries the preload.
+        # At the start the suspension is uncompressed and the tyre carries the preload.
         start = float(ground.position[0]) - initial_deflection(plant, self._preload)
         start += initial_yield(plant, self._preload)[0]
         structure = self._plate(
             plant.structure_cylinder, plant.computer, self._structure, self._start, start
         )
-        nothing = np.zeros_like(self._voltage)
-        besides = besides or Disturbances(nothing, nothing, nothing, nothing)
+        zero = np.zeros_like(self._voltage)
+        disturbances = disturbances or Disturbances(zero, zero, zero, zero)
         ground, structure = (
-            self._displace(ground, besides.ground),
-            self._displace(structure, besides.structure),
+            self._displace(ground, disturbances.ground),
+            self._displace(structure, disturbances.structure),
         )
         out = move_carriage(
             plant=plant,
             plates=(ground, structure),
-            voltage=self._voltage + besides.voltage,
-            pushed=besides.force,
+            voltage=self._voltage + disturbances.voltage,
+            pushed=disturbances.force,
             start=start,
             travel=0.0,
             preload=self._preload,
@@ -179,18 +209,26 @@ class QuarterCarModel(Model[RigPlant]):
         )
         return clip_diverged(out)
 
-    def _displace(self, of: Plate, by: Array) -> Plate:
-        if not by.any():
-            return of
-        ticks = np.arange(len(by) * self._steps + 1) / self._steps
-        motion = np.interp(ticks, np.arange(len(by)), by)
-        ahead = motion[np.arange(len(by)) * self._steps + 1]
-        return Plate(of.position + motion, of.onward + ahead)
+    def _displace(self, plate: Plate, shift: Array) -> Plate:
+        if not shift.any():
+            return plate
+        ticks = np.arange(len(shift) * self._steps + 1) / self._steps
+        motion = np.interp(ticks, np.arange(len(shift)), shift)
+        ahead = motion[np.arange(len(shift)) * self._steps + 1]
+        return Plate(plate.position + motion, plate.onward + ahead)
 
     def predict_disturbed(self, plant: RigPlant, entry: str, amount: Array) -> Array:
-        """What the plant's sensors would read under a disturbance, shape (4, ticks). entry: a
-        sensor's name, or a field of Disturbances, whose voltage is taken in N; amount: shape
-        (ticks,)."""
+        """Return the sensors' readings under a disturbance, shape (4, ticks).
+
+        Parameters
+        ----------
+        plant
+            Parameters of the rig.
+        entry
+            Name of a sensor, or field of `Disturbances`. A voltage is given as motor force, N.
+        amount
+            Disturbance, m or N, shape (ticks,).
+        """
         if entry in Measurements._fields:
             sensed = self.predict(plant)
             sensed[Measurements._fields.index(entry)] += amount
@@ -250,13 +288,12 @@ class QuarterCarModel(Model[RigPlant]):
         return Motion(position, np.gradient(position, self._period), true[3])
 
     def predict(self, plant: RigPlant) -> Array:
-        """The same through the plant's sensors, noise and quantisation apart."""
+        """Return the sensors' readings without noise and quantisation, shape (4, ticks)."""
         mechanical = tuple(getattr(plant, name) for name in MECHANICAL)
         true = self._last.get(mechanical)
         if true is None:
             true = self.predict_true(plant)
-            # Candidates at sensors leave the mechanics as they are, so what was worked out last
-            # often serves again.
+            # Effects at sensors leave the mechanics as they are: the last motions serve again.
             self._last = {**dict(list(self._last.items())[-KEPT_MOTIONS:]), mechanical: true}
         return np.stack(
             [

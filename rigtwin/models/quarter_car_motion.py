@@ -1,7 +1,15 @@
-"""How the quarter car moves between its plates: one scalar inclusion a step, solved exactly.
+"""Motion of the quarter car between its plates: one scalar inclusion per step, solved exactly.
 
-Positions are taken at the steps and velocities midway between them, which makes the scheme second
-order.
+The carriage (position x, velocity v, mass m) between the ground plate z_g and structure plate z_s:
+
+    m·v' + d_rail·v + F_rail(v) = F_tyre(z_g − x) − F_motor + d_motor·(z_s' − v) + F_dry(z_s' − v)
+
+F_rail and F_dry are set-valued dry friction. A tyre only pushes. With v implicit, each step is a
+piecewise linear, monotonic inclusion in v, so its solution is found case by case, without
+iteration or regularised friction (Moreau's time stepping; Acary and Brogliato, Numerical Methods
+for Nonsmooth Dynamical Systems, 2008).
+
+Positions are taken at the steps and velocities midway between them: the scheme is second order.
 """
 
 from __future__ import annotations
@@ -31,24 +39,22 @@ from rigtwin.simulation.plant import Contacts, contacts, stiffness_ratio
 
 
 class Plate(NamedTuple):
-    """A plate's unloaded motion. position: m at every step and one beyond, shape (steps·ticks +
-    1,); onward: where the command held before a tick would take it one step later, shape
-    (ticks,)."""
+    """Unloaded motion of a plate under its command."""
 
-    position: Array
-    onward: Array
+    position: Array  # Position at every step and one beyond, m, shape (steps·ticks + 1,).
+    onward: Array  # Position one step after each tick under the old command, m, shape (ticks,).
 
 
 class Carriage(NamedTuple):
-    """What the carriage's equation of motion needs besides its contacts."""
+    """Constants of the carriage's equation of motion, except those of its contacts."""
 
-    timestep: float
-    mass: float
-    rail_viscous: float
-    motor_viscous: float
-    motor_constant: float
-    motor_share: float
-    voltage_limit: float
+    timestep: float  # Integration step, s.
+    mass: float  # Mass of the carriage, kg.
+    rail_viscous: float  # Viscous friction of the rail, Ns/m.
+    motor_viscous: float  # Viscous friction between motor and carriage, Ns/m.
+    motor_constant: float  # Force per unit of voltage, N/V.
+    motor_share: float  # Share of a force step that the motor covers in a timestep.
+    voltage_limit: float  # Largest voltage of the amplifier, V.
 
 
 @kernel
@@ -62,7 +68,9 @@ def _plate(
     position: Array,
     onward: Array,
 ) -> None:
+    """Move a cylinder by its commands; write `position` and `onward` as in `Plate`."""
     for tick in range(len(commands)):
+        # `held.memory[3]` is the last conditioned command, which still acts at this tick.
         onward[tick] = next_position(model, state, held.memory[3])
         for step in range(steps):
             position[tick * steps + step] = state.position[0]
@@ -79,27 +87,27 @@ def move_plate(
     timestep: float,
     steps: int,
 ) -> Plate:
-    """A cylinder under its commands, from rest.
+    """Move a cylinder by its commands, from rest.
 
     Parameters
     ----------
     cylinder, computer
-        Their parameters.
+        Parameters of the cylinder and of the computer that commands it.
     commands
-        m, shape (ticks,).
+        Commands, m, shape (ticks,).
     start
-        Command that was held before, m.
+        Command before the test, m.
     at
-        Where it rests, m; None: where that command holds it.
+        Initial position, m. Default (None): where the command before the test holds the cylinder.
     timestep
-        s.
+        Integration step, s.
     steps
-        Of integration a tick.
+        Integration steps per tick.
 
     Returns
     -------
     Plate
-        Its unloaded motion.
+        Unloaded motion of the plate.
     """
     conditioning = actuator(cylinder, computer, timestep)
     held = hold(conditioning, start)
@@ -122,24 +130,28 @@ def move_plate(
 def solve_velocity(
     rhs: float, inertia: float, rail: tuple[float, float], motor: tuple[float, float], plate: float
 ) -> float:
-    """The velocity v that solves inertia·v + rail friction − motor friction ∋ rhs.
+    """Solve inertia·v + rail friction(v) − motor friction(plate − v) ∋ rhs for the velocity v.
 
     Parameters
     ----------
-    rhs, inertia
-        Momentum Ns, and kg.
+    rhs
+        Momentum without dry friction, Ns.
+    inertia
+        Inertia with implicit damping, kg.
     rail
-        Impulses, Ns, that it can bear against positive and negative v.
+        Limits of the rail's friction impulse against positive and negative v, Ns.
     motor
-        The same against positive and negative plate − v.
+        Limits of the motor's friction impulse against positive and negative plate − v, Ns.
     plate
-        The plate's velocity, m/s.
+        Velocity of the plate, m/s.
 
     Returns
     -------
     float
-        m/s.
+        Velocity, m/s.
     """
+    # The left side grows with v and jumps at v = 0 (rail sticks) and v = plate (motor sticks).
+    # Try the three ranges between the jumps; clipping the middle one covers both sticking cases.
     below = (rhs + rail[1] + motor[0]) / inertia
     if below < min(0.0, plate):
         return below
@@ -163,34 +175,34 @@ def motor_friction(
     plate: float,
     velocity: float,
 ) -> float:
-    """The dry friction of the motor at that solution.
+    """Return the motor's dry friction at the solution of `solve_velocity`.
 
     Parameters
     ----------
     rhs, inertia, rail, motor, plate
-        As `solve_velocity` takes them.
+        Arguments of `solve_velocity`.
     velocity
-        Its solution, m/s.
+        Solution of `solve_velocity`, m/s.
 
     Returns
     -------
     float
-        Impulse on the carriage, Ns.
+        Friction impulse on the carriage, Ns.
     """
     if velocity < plate:
         return motor[0]
     if velocity > plate:
         return -motor[1]
-    left = inertia * velocity - rhs
+    unbalanced = inertia * velocity - rhs
     if velocity > 0.0:
-        left += rail[0]
+        unbalanced += rail[0]
     elif velocity < 0.0:
-        left -= rail[1]
+        unbalanced -= rail[1]
     else:
-        # Both stick: the rail carries what it can, as at the start of a test before anything has
-        # moved.
-        left += min(max(-left, -rail[1]), rail[0])
-    return min(max(left, -motor[1]), motor[0])
+        # Both contacts stick, and their shares are not unique. The rail takes as much as it can, as
+        # at the start of a test before anything has moved.
+        unbalanced += min(max(-unbalanced, -rail[1]), rail[0])
+    return min(max(unbalanced, -motor[1]), motor[0])
 
 
 @kernel
@@ -210,21 +222,26 @@ def _mechanics(
     pushed: Array,
     out: Array,
 ) -> None:
-    """pushed: a force on the carriage besides, N, shape (ticks,); out: the true sensors' values,
-    shape (4, ticks)."""
+    """Integrate the carriage between its plates.
+
+    Plates, voltage (V) and `pushed`, an unmodelled force on the carriage (N), are those of
+    `move_carriage`. The readings of ideal sensors are written to `out`, shape (4, ticks).
+    """
+    # One kernel on purpose: parts of their own would pass and return two dozen scalars in every
+    # step.
     h = carriage.timestep
     x, v, force = start, 0.0, preload
     yielding = 0.0
     inertia = carriage.mass + h * (carriage.rail_viscous + carriage.motor_viscous)
-    # Out of the loop, or out of their tuple: in it they cost as much as the rest of a step.
+    # Divisions and tuple fields are taken out of the loop: there they double the cost of a step.
     rate, yielded, changing = 1.0 / h, now.yielded, now.changing
     ground_fades, structure_fades = 1.0 / (now.ground_lag + h), 1.0 / (now.structure_lag + h)
     ground_share = share_of_load(now.ground_compliance, now.ground_lag, h)
     structure_share = share_of_load(now.structure_compliance, now.structure_lag, h)
     for tick in range(len(voltage)):
         for step in range(-1, steps):
-            # Before the tick's commands act, once as if the old ones went on: that is what the
-            # sensors see.
+            # Step −1 is a trial under the old commands: the sensors read the force before the
+            # tick's commands act. It is not integrated.
             place = tick * steps + max(step, 0)
             ground_here, structure_here = ground[place], structure[place]
             if step < 0:
@@ -234,7 +251,7 @@ def _mechanics(
             plate_velocity = (structure_there - structure_here) * rate
             ground_velocity = (ground_there - ground_here) * rate
             structure_now, ground_now = structure_here + yielded[1], ground_here + yielded[0]
-            # How fast the plates would give up what they have yielded, without load.
+            # Rate at which a yielded plate would return without load, m/s.
             ground_loss = (now.ground_unloaded - yielded[0]) * ground_fades
             structure_loss = (now.structure_unloaded - yielded[1]) * structure_fades
             ground_velocity += ground_loss
@@ -244,7 +261,7 @@ def _mechanics(
                 (h * now.rail.coulomb, h * now.rail.coulomb),
                 (h * now.motor.coulomb, h * now.motor.coulomb),
             )
-            bias = beside = 0.0
+            bias = gas = 0.0
             forward = backward = now.motor.coulomb
             if changing:
                 forward, backward = breakaway(now.rail, now.rail_gap, x, v, force)
@@ -257,22 +274,26 @@ def _mechanics(
                     bias = now.cogging * math.sin(
                         2.0 * math.pi * travel / now.cogging_pitch + now.cogging_phase
                     )
+            # The motor's force and friction act on the carriage through the load cell, a gas spring
+            # beside it does not.
             if now.gas.force > 0.0:
-                beside = spring_force(now.gas, -travel)
+                gas = spring_force(now.gas, -travel)
             free = carriage.mass * v + h * (
-                carriage.motor_viscous * plate_velocity - force - bias - beside + pushed[tick]
+                carriage.motor_viscous * plate_velocity - force - bias - gas + pushed[tick]
             )
             spring = damping = 0.0
             if deflection > 0.0:
+                # Tyre: F = k·δ + d·(z_g' − v), implicit in v. A ground plate that yields by
+                # share·F takes a part of the deflection, which divides the force by `loading`.
                 ratio = stiffness_ratio(now, deflection)
-                given = 1.0 + ground_share * (h * now.stiffness * ratio + now.damping)
-                spring = now.stiffness * (deflection + h * ground_loss) * ratio / given
-                damping = now.damping / given
+                loading = 1.0 + ground_share * (h * now.stiffness * ratio + now.damping)
+                spring = now.stiffness * (deflection + h * ground_loss) * ratio / loading
+                damping = now.damping / loading
             while True:
                 push, resisted = h * (spring + damping * ground_velocity), h * damping
                 if now.structure_compliance > 0.0:
                     velocity, cell = solve_yielding(
-                        rhs=carriage.mass * v + h * (pushed[tick] - beside) + push,
+                        rhs=carriage.mass * v + h * (pushed[tick] - gas) + push,
                         inertia=carriage.mass + h * carriage.rail_viscous + resisted,
                         timestep=h,
                         rail=rail,
@@ -291,7 +312,7 @@ def _mechanics(
                 tyre = spring + damping * (ground_velocity - velocity)
                 if tyre >= 0.0:
                     break
-                # A tyre does not pull.
+                # A tyre does not pull: solve again without contact.
                 spring = damping = 0.0
             if step < 0:
                 out[0, tick], out[1, tick], out[2, tick], out[3, tick] = (
@@ -304,9 +325,9 @@ def _mechanics(
             yielding = structure_loss + structure_share * cell
             yielded[0] += h * (ground_loss - ground_share * tyre)
             yielded[1] += h * yielding
-            asked = condition(motor_drive, motor_command, voltage[tick])
-            asked = min(max(asked, -carriage.voltage_limit), carriage.voltage_limit)
-            force += carriage.motor_share * (carriage.motor_constant * asked - force)
+            drive_voltage = condition(motor_drive, motor_command, voltage[tick])
+            drive_voltage = min(max(drive_voltage, -carriage.voltage_limit), carriage.voltage_limit)
+            force += carriage.motor_share * (carriage.motor_constant * drive_voltage - force)
             v = velocity
             x += h * v
 
@@ -321,18 +342,20 @@ def follow_plates(
     preload: float,
     start: float,
 ) -> Array:
-    """The plant between plates that move as prescribed, whatever loads them.
+    """Simulate the carriage between plates whose motion is prescribed, whatever their load.
 
     Parameters
     ----------
     plant
-        Its parameters; those of its cylinders do not count.
+        Parameters of the rig. Those of its cylinders are ignored.
     timestep
-        s.
+        Integration step, s.
     ground, structure
-        m, at every timestep and at one more, shape (timesteps + 1,).
-    voltage, pushed
-        V, and a force on the carriage besides, N, shape (timesteps,).
+        Positions of the plates at every step and one beyond, m, shape (timesteps + 1,).
+    voltage
+        Voltage of the motor's amplifier, V, shape (timesteps,).
+    pushed
+        Additional force on the carriage, N, shape (timesteps,).
     preload
         Motor force at the start, N.
     start
@@ -341,7 +364,7 @@ def follow_plates(
     Returns
     -------
     array
-        What ideal sensors would read, rows as in Measurements, shape (4, timesteps).
+        Readings of ideal sensors, rows as in `Measurements`, shape (4, timesteps).
     """
     rigid = Cylinder()
     plant = plant._replace(ground_cylinder=rigid, structure_cylinder=rigid)
@@ -358,6 +381,21 @@ def follow_plates(
     )
 
 
+def _arrange_carriage(plant: RigPlant, timestep: float) -> Carriage:
+    """Return the constants of the carriage's equation of motion."""
+    motor: Motor = plant.motor
+    return Carriage(
+        timestep=timestep,
+        mass=plant.carriage.mass,
+        rail_viscous=plant.rail.viscous,
+        motor_viscous=motor.viscous,
+        motor_constant=motor.constant,
+        # Exact solution of the amplifier's first-order lag over a step.
+        motor_share=1.0 - math.exp(-timestep / motor.time_constant),
+        voltage_limit=min(motor.voltage_limit, motor.force_limit / motor.constant),
+    )
+
+
 def move_carriage(
     plant: RigPlant,
     plates: tuple[Plate, Plate],
@@ -369,40 +407,34 @@ def move_carriage(
     timestep: float,
     steps: int,
 ) -> Array:
-    """The carriage between its plates, from rest.
+    """Simulate the carriage between its plates, from rest.
 
     Parameters
     ----------
     plant
-        Its parameters.
+        Parameters of the rig.
     plates
-        Ground and structure, as they move unloaded.
-    voltage, pushed
-        V, and a force on the carriage besides, N, shape (ticks,).
+        Unloaded motions of the ground plate and the structure plate.
+    voltage
+        Voltage of the motor's amplifier, V, shape (ticks,).
+    pushed
+        Additional force on the carriage, N, shape (ticks,).
     start, travel
-        Of carriage and suspension at the start, m.
+        Position of the carriage and travel of the suspension at the start, m.
     preload
         Motor force at the start, N.
     timestep
-        s.
+        Integration step, s.
     steps
-        Of integration a tick.
+        Integration steps per tick.
 
     Returns
     -------
     array
-        What ideal sensors would read, rows as in Measurements, shape (4, ticks).
+        Readings of ideal sensors, rows as in `Measurements`, shape (4, ticks).
     """
     motor: Motor = plant.motor
-    carriage = Carriage(
-        timestep=timestep,
-        mass=plant.carriage.mass,
-        rail_viscous=plant.rail.viscous,
-        motor_viscous=motor.viscous,
-        motor_constant=motor.constant,
-        motor_share=1.0 - math.exp(-timestep / motor.time_constant),
-        voltage_limit=min(motor.voltage_limit, motor.force_limit / motor.constant),
-    )
+    carriage = _arrange_carriage(plant, timestep)
     out = np.empty((4, len(voltage)))
     ground, structure = plates
     _mechanics(

@@ -1,4 +1,4 @@
-"""The forces that a mechanism's bodies take to move as prescribed, by MuJoCo's inverse dynamics."""
+"""Inverse dynamics of a mechanism's rigid bodies, by MuJoCo: τ = M(q)·q'' + c(q, q')."""
 
 from __future__ import annotations
 
@@ -25,12 +25,25 @@ def _invert(
     qpos: Array,
     qvel: Array,
     qacc: Array,
-    found: Array,
+    forces: Array,
     motion: Array,
     out: Array,
 ) -> None:
-    """places, dofs: of the joints that move, in MuJoCo's vectors, which qpos, qvel, qacc and found
-    are; motion: shape (3, joints, ticks); out: shape (joints, ticks)."""
+    """Compute the joints' forces tick by tick.
+
+    Parameters
+    ----------
+    model, data
+        Addresses of MuJoCo's model and data.
+    places, dofs
+        Indices of the moving joints in `qpos` and in the vectors of velocities, shape (joints,).
+    qpos, qvel, qacc, forces
+        Vectors of the data: positions, velocities, accelerations, and the result.
+    motion
+        Positions, velocities and accelerations, shape (3, joints, ticks).
+    out
+        Forces, written, N or Nm, shape (joints, ticks).
+    """
     for tick in range(motion.shape[2]):
         for joint in range(len(dofs)):
             qpos[places[joint]] = motion[0, joint, tick]
@@ -38,43 +51,57 @@ def _invert(
             qacc[dofs[joint]] = motion[2, joint, tick]
         inverse(model, data)
         for joint in range(len(dofs)):
-            out[joint, tick] = found[dofs[joint]]
+            out[joint, tick] = forces[dofs[joint]]
 
 
 HEAVIER = 100.0
-"""kg or kg m² at every joint while what a body adds is worked out."""
+"""Inertia added to every joint while the regressor is computed, kg or kg m²."""
 ROUNDING = 1e-11
-"""Share of the largest force below which a force is rounding."""
+"""Share of the largest force below which a force counts as rounding error."""
 
 
 def _arrange_unit(unit: Array) -> tuple[float, Array, Array, Array]:
-    """Mass, centre, principal moments and their axes, a quaternion, of one of the ten parameters
-    alone, or of none; of a first moment, of a mass of 1 kg at 1 m."""
-    nothing, straight = np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
+    """Return the MuJoCo body that has one inertial parameter of 1 and all others 0.
+
+    `unit` is a row of the identity matrix, shape (10,), or zero for a body without mass. A first
+    moment of 1 kg m is made by 1 kg at 1 m; the caller subtracts the mass. The result is mass,
+    centre, principal moments and the quaternion of their axes.
+    """
+    zeros, straight = np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
     if not unit.any():
-        return 0.0, nothing, nothing, straight
+        return 0.0, zeros, zeros, straight
     place = int(np.argmax(unit))
     if place == 0:
-        return 1.0, nothing, nothing, straight
+        return 1.0, zeros, zeros, straight
     if place < 4:
+        # Moments of −1 about the two normal axes cancel the parallel-axis term of the point mass.
         centre = np.eye(3)[place - 1]
         return 1.0, centre, centre - 1.0, straight
     if place < 7:
-        return 0.0, nothing, np.eye(3)[place - 4], straight
-    # A product of inertia is a moment along one diagonal and as much less along the other.
-    one, other = ((0, 1), (0, 2), (1, 2))[place - 7]
+        return 0.0, zeros, np.eye(3)[place - 4], straight
+    # A product of inertia has principal moments ±1 along the diagonals of its plane.
+    first, second = ((0, 1), (0, 2), (1, 2))[place - 7]
     axes = np.zeros((3, 3))
-    axes[[one, other], 0] = axes[other, 1] = np.sqrt(0.5)
-    axes[one, 1] = -np.sqrt(0.5)
+    axes[[first, second], 0] = axes[second, 1] = np.sqrt(0.5)
+    axes[first, 1] = -np.sqrt(0.5)
     axes[:, 2] = np.cross(axes[:, 0], axes[:, 1])
     quaternion = np.empty(4)
     mujoco.mju_mat2Quat(quaternion, axes.ravel())
-    return 0.0, nothing, np.array([1.0, -1.0, 0.0]), quaternion
+    return 0.0, zeros, np.array([1.0, -1.0, 0.0]), quaternion
 
 
 def strip(model: mujoco.MjModel, guides: Sequence[Component], rotors: Sequence[Component]) -> None:
-    """Takes out of a model what components stand for that are worked out elsewhere: damping and
-    springs of guides, inertia of rotors."""
+    """Remove from a model what components describe: damping and springs, inertia of rotors.
+
+    Parameters
+    ----------
+    model
+        MuJoCo model, changed in place.
+    guides
+        Guides, whose damping and springs are removed from their joints or tendons.
+    rotors
+        Rotors, whose inertia (armature) is removed.
+    """
     for component in guides:
         if component.element == "tendon":
             number = model.tendon(component.mjcf).id
@@ -91,8 +118,21 @@ def strip(model: mujoco.MjModel, guides: Sequence[Component], rotors: Sequence[C
 
 
 def list_nominal(model: mujoco.MjModel, name: str) -> tuple[float, Array, Array]:
-    """What a model says of a body alone: its mass, kg, centre, m, shape (3,), and its inertia about
-    that along the frame's axes, kg m², shape (3, 3)."""
+    """Return mass, centre of mass and inertia of a body in the model.
+
+    Parameters
+    ----------
+    model
+        MuJoCo model.
+    name
+        Name of the body.
+
+    Returns
+    -------
+    tuple
+        Mass, kg; centre of mass in the body's frame, m, shape (3,); inertia about the centre of
+        mass along the frame's axes, kg m², shape (3, 3).
+    """
     body = model.body(name)
     turned = np.empty(9)
     mujoco.mju_quat2Mat(turned, body.iquat)
@@ -101,8 +141,19 @@ def list_nominal(model: mujoco.MjModel, name: str) -> tuple[float, Array, Array]
 
 
 class RigidBodies:
-    """The bodies of an MJCF without what the description's components stand for: friction, springs
-    and rotors of joints and tendons. No contacts, stops or equalities."""
+    """Rigid bodies without the friction, springs and rotors that components describe.
+
+    Contacts, joint limits and equalities of the MJCF are switched off.
+
+    Parameters
+    ----------
+    path
+        MJCF of the machine.
+    joints
+        Joints that move; all others stay where the MJCF has them.
+    guides, rotors
+        Components whose friction, springs and inertia are modelled elsewhere.
+    """
 
     def __init__(
         self,
@@ -111,8 +162,6 @@ class RigidBodies:
         guides: Sequence[Component],
         rotors: Sequence[Component],
     ) -> None:
-        """joints: that move; all others stay where the MJCF has them. guides, rotors: components
-        that are worked out elsewhere."""
         self._model = model = compile_model(path)
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
         strip(model, guides, rotors)
@@ -122,65 +171,69 @@ class RigidBodies:
         self._dofs = np.array([model.jnt_dofadr[number] for number in numbers], np.int64)
 
     def list_nominal(self, name: str) -> tuple[float, Array, Array]:
-        """What the MJCF says of a body alone."""
+        """Return mass, centre of mass and inertia of a body in the MJCF; see `list_nominal`."""
         return list_nominal(self._model, name)
 
     def turn(self, base: Base) -> Array:
-        """Gravity, m/s², shape (3,), where the base is turned."""
+        """Return gravity in the frame of a tilted base, m/s², shape (3,)."""
         return turn_gravity(base, self._gravity)
 
     def regressor(self, motion: Array, name: str, gravity: Array | None = None) -> Array:
-        """What each inertial parameter of a body adds to the forces, which are linear in them.
+        """Return the regressor Y of a body: its forces per unit of each inertial parameter.
+
+        Forces are linear in the inertial parameters π of a body, τ = Y(q, q', q'')·π (Atkeson, An
+        and Hollerbach, International Journal of Robotics Research 5(3), 1986). Each column is one
+        inverse dynamics with a unit parameter, less that of a body without mass.
 
         Parameters
         ----------
         motion
             Positions, velocities and accelerations, shape (3, joints, ticks).
         name
-            The body's, in the MJCF.
+            Name of the body in the MJCF.
         gravity
-            m/s², shape (3,); by default the MJCF's.
+            Gravity, m/s², shape (3,). Default: the MJCF's.
 
         Returns
         -------
         array
-            N or Nm for a kg, kg m or kg m² of each of `INERTIAL`, shape (10, joints, ticks);
-            exactly 0 where there is nothing but rounding.
+            Forces per unit of each parameter in `INERTIAL`, N or Nm per kg, kg m or kg m², shape
+            (10, joints, ticks). Rounding errors are set to exactly 0.
         """
         model = copy(self._model)
         number = model.body(name).id
-        # MuJoCo warns of joints that nothing resists; what is the same in all of them cancels out.
+        # MuJoCo warns of joints without inertia. The added inertia is in all columns and cancels.
         model.dof_armature[:] += HEAVIER
         model.body_sameframe[number] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE
-        found = []
-        # A body without mass but the one moment that is meant can be worked out, if not be made.
+        forces = []
+        # Such a body is not physical, but inverse dynamics only multiplies and adds its parameters.
         for unit in np.eye(len(INERTIAL) + 1)[:, :-1]:
             mass, centre, principal, axes = _arrange_unit(unit)
             model.body_mass[number], model.body_ipos[number] = mass, centre
             model.body_inertia[number], model.body_iquat[number] = principal, axes
-            found.append(self._forces(model, motion, gravity))
-        without = found.pop()
-        columns = np.stack(found) - without
-        # A first moment was put in as a mass at 1 m.
+            forces.append(self._forces(model, motion, gravity))
+        massless = forces.pop()
+        columns = np.stack(forces) - massless
+        # Column of a first moment = (1 kg at 1 m) − (1 kg at the origin).
         columns[1:4] -= columns[0]
-        rounding = ROUNDING * max(float(np.max(np.abs(each))) for each in (columns, without))
+        rounding = ROUNDING * max(float(np.max(np.abs(each))) for each in (columns, massless))
         columns[np.max(np.abs(columns), axis=2) < rounding] = 0.0
         return columns
 
     def forces(self, motion: Array, gravity: Array | None = None) -> Array:
-        """The forces on the joints.
+        """Return the joints' forces that a motion requires.
 
         Parameters
         ----------
         motion
             Positions, velocities and accelerations, shape (3, joints, ticks).
         gravity
-            m/s², shape (3,); by default the MJCF's.
+            Gravity, m/s², shape (3,). Default: the MJCF's.
 
         Returns
         -------
         array
-            N or Nm, shape (joints, ticks).
+            Forces, N or Nm, shape (joints, ticks).
         """
         return self._forces(self._model, motion, gravity)
 
@@ -198,7 +251,7 @@ class RigidBodies:
             qpos=data.qpos,
             qvel=data.qvel,
             qacc=data.qacc,
-            found=data.qfrc_inverse,
+            forces=data.qfrc_inverse,
             motion=np.ascontiguousarray(motion),
             out=out,
         )

@@ -1,4 +1,4 @@
-"""Where a joint is and how fast it goes when a recording starts."""
+"""Reading and fitting the initial state of a recording: positions and velocities of joints."""
 
 from __future__ import annotations
 
@@ -9,34 +9,39 @@ import numpy as np
 from rigtwin.numerics.arrays import Array
 
 STEPS, LIKELY = 4, 10.0
-"""Gauss-Newton steps, and errors of the first samples within which a start lies."""
+"""Largest number of Gauss-Newton steps. Width of the prior of the initial state, in standard errors
+of the state as read."""
 SHARES, ENOUGH = (1.0, 0.25), 1e-5
-"""Of a step that are tried, and of the cost that a further step must save."""
+"""Shares of a Gauss-Newton step that are tried in turn. Relative decrease of the cost below which
+the fit ends."""
 BEGINNING = 0.03
-"""s, from which a start is read."""
+"""Time from which the initial state is read, s."""
 FEWEST = 8
-"""Samples that it is read from at least."""
+"""Smallest number of samples from which it is read."""
+# A parabola fitted to n samples of noise σ has, at its end, a standard deviation of 3σ/√n in value
+# and of 8√3·σ/(n·√n·period) = 13.9 σ/(n·√n·period) in slope, for large n. For the value, 3σ without
+# the division is on the safe side.
 ERRORS, OF_END = 3.0, 14.0
-"""Of a parabola through n samples of noise σ: its end is off by up to 3 σ, its slope there by up to
-14 σ / (√n · n · period)."""
+"""Error of the parabola's end, in noise standard deviations, and of its slope there, in
+σ / (√n · n · period)."""
 Start = tuple[float, float]
-"""Position m and velocity m/s."""
+"""Initial position and velocity of a joint, m and m/s."""
 
 
 def read_start(measured: Array, period: float) -> Start:
-    """The start by a parabola through the first samples.
+    """Read value and slope at the start by a parabola through the first samples.
 
     Parameters
     ----------
     measured
-        Position, shape (ticks,).
+        Measured position, m, shape (ticks,).
     period
-        s, of a tick.
+        Time from tick to tick, s.
 
     Returns
     -------
     tuple
-        Position and velocity.
+        Position and velocity, m and m/s.
     """
     ticks = _ticks(period, len(measured))
     curve = np.polynomial.Polynomial.fit(np.arange(ticks) * period, measured[:ticks], 2)
@@ -44,21 +49,21 @@ def read_start(measured: Array, period: float) -> Start:
 
 
 def start_error(noise: float, period: float, count: int) -> Start:
-    """How far `read_start` may be off.
+    """Return the largest plausible errors of `read_start`.
 
     Parameters
     ----------
     noise
-        Standard deviation of a sample.
+        Standard deviation of a sample, m.
     period
-        s, of a tick.
+        Time from tick to tick, s.
     count
-        Samples there are.
+        Number of samples in the recording.
 
     Returns
     -------
     tuple
-        Of position and velocity.
+        Errors of position and velocity, m and m/s.
     """
     ticks = _ticks(period, count)
     return ERRORS * noise, OF_END * noise / (np.sqrt(ticks) * ticks * period)
@@ -69,25 +74,28 @@ def _ticks(period: float, count: int) -> int:
 
 
 def find_slopes(
-    predict: Callable[[Array], Array], first: Array, error: Array, here: Array
+    predict: Callable[[Array], Array], first: Array, error: Array, predicted: Array
 ) -> Array:
-    """How a prediction changes with each unknown of a start by its error.
+    """Return the change of a prediction by one standard error of each unknown.
 
     Parameters
     ----------
     predict
-        What is measured, shape (n,), from a start.
-    first, error
-        The start as it was read, and its error, shape (unknowns,).
-    here
-        What is predicted of it, shape (n,).
+        Prediction of the measured signals, shape (n,), from an initial state.
+    first
+        Initial state as read, shape (unknowns,).
+    error
+        Its standard errors, shape (unknowns,).
+    predicted
+        Prediction from `first`, shape (n,).
 
     Returns
     -------
     array
-        Shape (n, unknowns).
+        Differences, shape (n, unknowns).
     """
-    return np.stack([predict(first + step) - here for step in np.diag(error)], axis=1)
+    # Differences over a whole standard error average over the kinks that dry friction makes.
+    return np.stack([predict(first + step) - predicted for step in np.diag(error)], axis=1)
 
 
 def fit_start(
@@ -95,53 +103,58 @@ def fit_start(
     measured: Array,
     first: Array,
     error: Array,
-    held: float | Array,
+    tolerance: float | Array,
     slopes: Array,
-    here: Array,
+    predicted_first: Array,
 ) -> Array:
-    """The start with which a machine goes as measured.
+    """Fit the initial state to the measured signals by damped Gauss-Newton steps.
+
+    With θ the state's change in standard errors, it minimises
+
+        |(measured − predict(first + error·θ)) / tolerance|² + |θ|² / LIKELY²
 
     Parameters
     ----------
     predict
-        What is measured, shape (n,), from a start.
+        Prediction of the measured signals, shape (n,), from an initial state.
     measured
-        The same as it was, shape (n,).
+        Measured signals, shape (n,).
     first
-        The start as it was read: positions, then velocities, shape (unknowns,).
+        Initial state as read: positions, then velocities, shape (unknowns,).
     error
-        Of that, shape (unknowns,).
-    held
-        To what it is predicted at best; a number, or shape (n,).
+        Its standard errors, shape (unknowns,).
+    tolerance
+        Standard deviation to which the signals can be predicted at best; a number, or shape (n,).
     slopes
-        As `find_slopes` has them.
-    here
-        What is predicted of `first`, shape (n,).
+        Derivatives by `find_slopes`, shape (n, unknowns).
+    predicted_first
+        Prediction from `first`, shape (n,).
 
     Returns
     -------
     array
         Positions and velocities, shape (unknowns,).
     """
-    columns = (slopes.T / held).T
-    # A start is known well enough to begin with that the derivatives there do for all steps.
+    columns = (slopes.T / tolerance).T
+    # The state is known well enough beforehand that one set of derivatives serves for all steps.
     normal = columns.T @ columns + np.eye(len(first)) / LIKELY**2
 
     def weigh(predicted: Array, moved: Array) -> tuple[Array, float]:
-        """What is left of a prediction, and its cost, from so many errors beside `first`."""
-        left = (measured - predicted) / held
-        return left, float(left @ left + moved @ moved / LIKELY**2)
+        """Return residual and cost of a prediction at `moved` standard errors from `first`."""
+        residual = (measured - predicted) / tolerance
+        return residual, float(residual @ residual + moved @ moved / LIKELY**2)
 
     moved = np.zeros(len(first))
-    left, cost = weigh(here, moved)
+    residual, cost = weigh(predicted_first, moved)
     for _ in range(STEPS):
-        step, before = np.linalg.solve(normal, columns.T @ left - moved / LIKELY**2), cost
+        step, before = np.linalg.solve(normal, columns.T @ residual - moved / LIKELY**2), cost
         for share in SHARES:
-            # Of what swings over or sticks the derivatives may say nothing.
+            # Where a joint sticks or swings over, the derivatives may mislead: accept a step only
+            # if it lowers the cost.
             tried = moved + share * step
-            there, other = weigh(predict(first + error * tried), tried)
-            if other < cost:
-                moved, left, cost = tried, there, other
+            tried_residual, tried_cost = weigh(predict(first + error * tried), tried)
+            if tried_cost < cost:
+                moved, residual, cost = tried, tried_residual, tried_cost
                 break
         if before - cost <= ENOUGH * before:
             break

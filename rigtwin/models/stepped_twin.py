@@ -1,4 +1,4 @@
-"""The twin of joints in a test whose commands are not known ahead: it goes tick by tick."""
+"""Twin of joints that advances tick by tick, for commands that are not known beforehand."""
 
 from __future__ import annotations
 
@@ -10,16 +10,28 @@ import numpy as np
 from rigtwin.components.conditioning import Actuator, ActuatorState, condition, hold
 from rigtwin.components.servo import Push, push
 from rigtwin.description.machine import Row
-from rigtwin.models.coupled_motion import Contacts, State, StepInputs, advance
+from rigtwin.models.forward_motion import Contacts, State, StepInputs, advance
 from rigtwin.models.multibody import Bodies
 from rigtwin.numerics.arrays import Array
 
 
 @dataclass(frozen=True)
 class Drive:
-    """An actuator that is commanded tick by tick. model: how its command is conditioned; factor,
-    limit: of the force that a conditioned command makes; servo, number: whether it is one of the
-    servos or of the force actuators, and which."""
+    """Actuator that is commanded tick by tick.
+
+    Attributes
+    ----------
+    model : Actuator
+        Conditioning of the command.
+    factor : float
+        Force per unit of conditioned command, N per unit; 1 for a servo.
+    limit : float
+        Limit of the force, N; unlimited for a servo, whose law has a limit of its own.
+    servo : bool
+        Whether the actuator is a servo rather than a force actuator.
+    number : int
+        Index among the servos or among the force actuators.
+    """
 
     model: Actuator
     factor: float
@@ -30,8 +42,17 @@ class Drive:
 
 @dataclass(frozen=True)
 class Sensing:
-    """What an ideal sensor reads. row: which; along: coordinates that it adds up, shape
-    (coordinates,), from `zero`."""
+    """Ideal sensor of the coordinates.
+
+    Attributes
+    ----------
+    row : Row
+        Name and measured quantity of the sensor.
+    along : Array
+        Direction of the sensor in the coordinates, shape (coordinates,).
+    zero : float
+        Position of the sensor at zero coordinates, m.
+    """
 
     row: Row
     along: Array
@@ -39,7 +60,33 @@ class Sensing:
 
 
 class SteppedTwin:
-    """All joints at the beginning of a test."""
+    """Joints that advance one tick at a time.
+
+    Parameters
+    ----------
+    bodies
+        Rigid bodies.
+    owner
+        Owner of the memory whose address `bodies` holds; kept to keep that memory alive.
+    contacts
+        Guides of the machine.
+    free, held
+        Indices of the free and of the prescribed coordinates.
+    state
+        State at the beginning of the test; advanced with each tick.
+    inputs
+        Inputs of the whole test. The commands of `drives` in it are ignored.
+    laws
+        Laws of the servos.
+    drives
+        Actuators that are commanded tick by tick.
+    sensing
+        Sensors that are read tick by tick.
+    h
+        Integration step, s.
+    steps
+        Integration steps per tick.
+    """
 
     def __init__(
         self,
@@ -56,21 +103,19 @@ class SteppedTwin:
         h: float,
         steps: int,
     ) -> None:
-        """owner: of the memory that compiled code knows by its address; inputs: of the whole test,
-        in which the commands of the drives are not looked at; laws: of the servos; h, steps: s, of
-        a step, and steps a tick."""
         self._bodies, self._owner, self._contacts = bodies, owner, contacts
         self._free, self._held, self._state, self._inputs = free, held, state, inputs
         self._laws, self._drives, self._sensing = tuple(laws), tuple(drives), tuple(sensing)
         self._h, self._steps, self.tick = h, steps, 0
         self._states: list[ActuatorState] = []
         size, two = len(state.place), 2 * steps
-        # The tick before and this one: what is before that has no influence any more.
+        # The kernel sees a window of two ticks, the last one and the current one: a step averages
+        # its command with the one before it, and looks no further back.
         self._window = inputs._replace(
             prescribed=np.zeros((size, two + 1)),
             pushes=np.zeros((len(inputs.pushes), two)),
-            besides=np.zeros((size, 2)),
-            on=np.zeros((len(inputs.on), 2)),
+            disturbance=np.zeros((size, 2)),
+            guide_disturbance=np.zeros((len(inputs.guide_disturbance), 2)),
             servos=inputs.servos._replace(commands=np.zeros((len(inputs.servos.laws), two))),
         )
         self._out = np.zeros((3, size, 2))
@@ -78,45 +123,47 @@ class SteppedTwin:
         self._foretold = len(held) > 0 or movers > len(self._drives)
 
     def sense(self) -> dict[str, float]:
-        """What ideal sensors read before the coming tick. Forces are those of the commands until
-        then."""
+        """Return the readings of ideal sensors before the coming tick, by name.
+
+        Forces are those of the commands up to this tick.
+        """
         state, pushed = self._state, None
-        found = {}
-        for each in self._sensing:
-            if each.row.kind == "position":
-                value = float(each.along @ state.place) + each.zero
-            elif each.row.kind == "velocity":
-                value = float(each.along @ state.speed)
+        readings = {}
+        for sensing in self._sensing:
+            if sensing.row.kind == "position":
+                value = float(sensing.along @ state.place) + sensing.zero
+            elif sensing.row.kind == "velocity":
+                value = float(sensing.along @ state.speed)
             else:
                 pushed = self._find_push() if pushed is None else pushed
-                value = float(each.along @ pushed) / float(each.along @ each.along)
-            found[each.row.name] = value
-        return found
+                value = float(sensing.along @ pushed) / float(sensing.along @ sensing.along)
+            readings[sensing.row.name] = value
+        return readings
 
     def _find_push(self) -> Array:
-        """What the actuators push the coordinates with, shape (coordinates,)."""
+        """Return the actuators' force on each coordinate, N, shape (coordinates,)."""
         window, last = self._window, 2 * self._steps - 1
-        found = window.levers.T @ window.pushes[:, last]
-        here = self._state.speed + 0.5 * (self._state.speed - self._state.before)
+        forces = window.levers.T @ window.pushes[:, last]
+        midspeed = self._state.speed + 0.5 * (self._state.speed - self._state.before)
         servos = window.servos
         for number, law in enumerate(self._laws):
             lever = servos.levers[number]
             at = float(lever @ self._state.place) + float(servos.zero[number])
-            found += lever * push(law, servos.commands[number, last], at, float(lever @ here))
-        return found
+            forces += lever * push(law, servos.commands[number, last], at, float(lever @ midspeed))
+        return forces
 
     def step(self, commands: Sequence[float]) -> Array:
-        """Goes through a tick.
+        """Advance by one tick.
 
         Parameters
         ----------
         commands
-            Of each drive.
+            Command of each drive, in its unit.
 
         Returns
         -------
         array
-            Positions, velocities and forces at its beginning, shape (3, coordinates).
+            Positions, velocities and forces at the beginning of the tick, shape (3, coordinates).
         """
         window, steps = self._window, self._steps
         servos = window.servos.commands
@@ -125,7 +172,7 @@ class SteppedTwin:
                 hold(drive.model, command)
                 for drive, command in zip(self._drives, commands, strict=True)
             ]
-        # Of what was before, the last step alone is looked at.
+        # Of the tick before, the kernel looks at the last step alone.
         window.pushes[:, steps - 1] = window.pushes[:, -1]
         servos[:, steps - 1] = servos[:, -1]
         if self._foretold:
@@ -135,6 +182,7 @@ class SteppedTwin:
             for step in range(steps, 2 * steps):
                 pushed = drive.factor * condition(drive.model, state, command)
                 signal[step] = min(max(pushed, -drive.limit), drive.limit)
+        # Before the first tick the actuators held its first command.
         if self.tick == 0:
             window.pushes[:, steps - 1] = window.pushes[:, steps]
             servos[:, steps - 1] = servos[:, steps]
@@ -155,7 +203,7 @@ class SteppedTwin:
         return self._out[:, :, 1]
 
     def _look_up(self) -> None:
-        """What of this tick was known before the test."""
+        """Copy the inputs of this tick that were known before the test into the window."""
         steps, known, window = self._steps, self._inputs, self._window
         first, last = self.tick * steps, (self.tick + 1) * steps
         window.prescribed[:, steps:] = known.prescribed[:, first : last + 1]

@@ -1,8 +1,7 @@
-"""Component replays: recorded signals drive one component alone, and its output is put beside what
-was measured.
+"""Replays of single components: recorded signals drive one component, and its output is predicted.
 
-All mechanics are the diagnosis' own model of the quarter car; a replay only prescribes more of its
-joints or forces than a test does.
+The mechanics are those of `models.quarter_car_motion`. A replay prescribes more of its motions or
+forces than a test does, and takes the other components out.
 """
 
 from __future__ import annotations
@@ -27,15 +26,22 @@ from rigtwin.numerics.compiling import kernel
 from rigtwin.simulation.plant import initial_deflection
 
 FIXED = 1e12
-"""kg; a carriage this heavy stays where it is."""
+"""Mass of a carriage that does not move, kg."""
 AWAY = 1.0
-"""m; a ground plate this far back does not touch the tyre."""
+"""Distance of a ground plate that does not touch the tyre, m."""
 
 
 @dataclass(frozen=True)
 class Output:
-    """What a replay of the mechanics gives at every tick: load cell force N, wheel position m;
-    shape (ticks,)."""
+    """Output of a replay of the mechanics.
+
+    Attributes
+    ----------
+    load_cell : Array
+        Force at the load cell, N, shape (ticks,).
+    wheel : Array
+        Position of the wheel, m, shape (ticks,).
+    """
 
     load_cell: Array
     wheel: Array
@@ -51,7 +57,9 @@ def _cylinder(
     substeps: int,
     out: Array,
 ) -> None:
+    """Write the plate's position at every tick to `out`, m, shape (ticks,)."""
     for tick in range(len(commands)):
+        # The position at a tick is that before its command acts.
         out[tick] = state.position[0]
         for _ in range(substeps):
             advance_cylinder(model, state, condition(conditioning, command, commands[tick]))
@@ -64,8 +72,26 @@ def replay_cylinder(
     start: float,
     position: float | None = None,
 ) -> Array:
-    """Command → plate position at every tick, m, unloaded, from rest at `position` under the
-    command `start`; by default where that command holds it."""
+    """Replay a cylinder: commands → unloaded plate position.
+
+    Parameters
+    ----------
+    cylinder
+        Parameters of the cylinder.
+    configuration
+        Settings of the test.
+    commands
+        Commands, m, shape (ticks,).
+    start
+        Command before the test, m.
+    position
+        Initial position, m. Default: where the command before the test holds the plate.
+
+    Returns
+    -------
+    array
+        Plate position at every tick, m, shape (ticks,).
+    """
     out, timestep = np.empty(len(commands)), configuration.timing.timestep
     conditioning = actuator(cylinder, configuration.plant.computer, timestep)
     command = hold(conditioning, start)
@@ -84,8 +110,8 @@ def replay_cylinder(
 
 
 def _interpolate(motion: Array, substeps: int) -> Array:
-    """A motion sampled at ticks, at every substep and one beyond, by a cubic spline: its velocity
-    must not jump, or a motor that sticks would have to pass on the blow."""
+    """Return a motion sampled at ticks at every substep and one beyond, by a cubic spline."""
+    # The velocity must not jump, or a sticking motor would transmit an impact at every tick.
     ticks = len(motion)
     times = np.arange(substeps * (ticks - 1) + 1) / substeps
     fine = interpolate(np.arange(ticks, dtype=float), motion, times)
@@ -102,8 +128,10 @@ def _run(
     preload: float,
     wheel: float,
 ) -> Output:
-    """force: on the carriage besides, N; preload: motor force at the start, N; wheel: carriage
-    position at the start, m."""
+    """Simulate the mechanics under plate motions, motor voltage and a force on the carriage, N.
+
+    `preload` is the motor force at the start, N, and `wheel` the carriage position there, m.
+    """
     substeps, ticks = configuration.substeps, len(voltage)
     count = substeps * (ticks - 1) + 1
     pushed = np.interp(np.arange(count) / substeps, np.arange(ticks), force)
@@ -112,6 +140,7 @@ def _run(
         timestep=configuration.timing.timestep,
         ground=_interpolate(ground, substeps),
         structure=_interpolate(structure, substeps),
+        # A command is held over its tick; a measured motion is interpolated.
         voltage=np.repeat(voltage, substeps)[:count],
         pushed=pushed,
         preload=preload,
@@ -123,18 +152,37 @@ def _run(
 def replay_carriage(
     configuration: Configuration, ground: Array, force: Array, preload: float
 ) -> Array:
-    """Ground motion and the force of motor and gas spring on the wheel → wheel position, m. Both
-    are out of it."""
+    """Replay the carriage: ground motion and suspension force → wheel position.
+
+    Motor and gas spring are taken out; their measured force acts instead.
+
+    Parameters
+    ----------
+    configuration
+        Settings of the test.
+    ground
+        Motion of the ground plate, m, shape (ticks,).
+    force
+        Force of motor and gas spring, N, shape (ticks,).
+    preload
+        Motor force at the start, N.
+
+    Returns
+    -------
+    array
+        Position of the wheel, m, shape (ticks,).
+    """
     plant = configuration.plant
+    # The measured force contains the motor's friction, so the motor must have none.
     alone = plant._replace(motor=Motor(coulomb=0.0), gas_spring=GasSpring())
-    nothing = np.zeros_like(force)
+    zero = np.zeros_like(force)
     wheel = float(ground[0]) - initial_deflection(plant, preload)
     return _run(
         plant=alone,
         configuration=configuration,
         ground=ground,
-        structure=nothing,
-        voltage=nothing,
+        structure=zero,
+        voltage=zero,
         force=-force,
         preload=0.0,
         wheel=wheel,
@@ -144,8 +192,24 @@ def replay_carriage(
 def replay_mechanics(
     configuration: Configuration, ground: Array, structure: Array, voltage: Array, preload: float
 ) -> Output:
-    """Both plates' motions and the motor's voltage → load cell force and wheel position: motor and
-    carriage together."""
+    """Replay motor and carriage together: plate motions and voltage → force and wheel position.
+
+    Parameters
+    ----------
+    configuration
+        Settings of the test.
+    ground, structure
+        Motions of the plates, m, shape (ticks,).
+    voltage
+        Command of the motor, V, shape (ticks,).
+    preload
+        Motor force at the start, N.
+
+    Returns
+    -------
+    Output
+        Force at the load cell and position of the wheel.
+    """
     plant = configuration.plant
     wheel = float(ground[0]) - initial_deflection(plant, preload)
     return _run(
@@ -163,19 +227,38 @@ def replay_mechanics(
 def replay_motor(
     configuration: Configuration, travel: Array, voltage: Array, preload: float
 ) -> Array:
-    """Travel and voltage → load cell force, N. Friction at standstill is not determined by
-    these."""
+    """Replay the motor: travel and voltage → force at the load cell.
+
+    These inputs do not determine friction at standstill.
+
+    Parameters
+    ----------
+    configuration
+        Settings of the test.
+    travel
+        Travel of the suspension, m, shape (ticks,).
+    voltage
+        Command of the motor, V, shape (ticks,).
+    preload
+        Motor force at the start, N.
+
+    Returns
+    -------
+    array
+        Force at the load cell, N, shape (ticks,).
+    """
+    # The carriage is held by its mass and the ground plate is out of reach: the motor is alone.
     alone = configuration.plant._replace(
         carriage=Carriage(FIXED), rail=Rail(coulomb=0.0), gas_spring=GasSpring()
     )
-    nothing = np.zeros_like(travel)
+    zero = np.zeros_like(travel)
     return _run(
         plant=alone,
         configuration=configuration,
-        ground=nothing - AWAY,
+        ground=zero - AWAY,
         structure=travel,
         voltage=voltage,
-        force=nothing,
+        force=zero,
         preload=preload,
         wheel=0.0,
     ).load_cell

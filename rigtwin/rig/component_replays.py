@@ -1,5 +1,4 @@
-"""The replays of one recording: every component alone, driven by measured signals; the mechanics
-together; the closed loop."""
+"""Replays of one recording: single components under measured signals, mechanics, closed loop."""
 
 from __future__ import annotations
 
@@ -37,23 +36,22 @@ from rigtwin.simulation.plant import initial_deflection, initial_yield
 from rigtwin.simulation.runner import simulate, without_limits
 
 RESOLVED_OVER = 0.03
-"""s; a travel velocity that moves less than the LVDT's noise in this time cannot be told from
+"""Time in which a moving travel must exceed the LVDT's noise, s. Slower motion counts as
 standstill."""
 CERTAIN = 3.0
 """Standard deviations of a velocity beyond which its sign is certain."""
 CLOSED_LOOP_SEED = 2**31 - 1
-"""Of the twin's noise in the closed loop: not one that a recording of a twin is likely to have."""
+"""Seed of the twin's noise in the closed loop, which a recording of a twin is unlikely to have."""
 
 
 class Undetermined(Exception):
-    """The recorded signals do not determine what a replay would compare. The message says why."""
+    """Error of a replay whose output the recorded signals do not determine."""
 
 
 class ComponentReplays:
-    """The replays of one recording by the twin of one configuration. Motions are estimated once and
-    shared.
+    """Replays of one recording by the twin of one configuration.
 
-    The data have to be fit for a comparison, see `data_checks`.
+    Motions are estimated once and shared by all replays. The recording has to pass `data_checks`.
     """
 
     def __init__(self, recording: Recording, configuration: Configuration) -> None:
@@ -61,6 +59,7 @@ class ComponentReplays:
         self.configuration = configuration
         self.period = recording.period
         self.preload = configuration.controller.preload
+        # The wheel has no sensor of its own: plate position minus travel.
         self.wheel = self._sensor("structure_lvdt") - self._sensor("suspension_lvdt")
 
     def _sensor(self, name: str) -> Array:
@@ -73,32 +72,33 @@ class ComponentReplays:
         return remove_mains(signal, self.period, self.configuration.plant.mains.frequency)
 
     def _without_zero(self, name: str) -> Array:
-        """What a sensor measured, its mains line, offset and drift taken away."""
+        """Return a sensor's reading without mains hum, offset and drift."""
         sensor = getattr(self.configuration.plant, name)
         return remove_drift(sensor, self._clean(self._sensor(name)), self.period) - sensor.offset
 
     def _apply_sensor(self, name: str, true: Array) -> Array:
-        """What the twin's sensor of that name makes of a true signal."""
+        """Return the reading of the twin's sensor of that name for a true signal."""
         return apply_sensor(getattr(self.configuration.plant, name), true, self.period)
 
     def _apply_lvdts(self, wheel: Array) -> Array:
-        """The difference of both LVDTs for a true wheel position and the plate's motion."""
+        """Return the difference of both LVDTs' readings for a true wheel position, m."""
         plate = self.structure_motion.position
         return self._apply_sensor("structure_lvdt", plate) - self._apply_sensor(
             "suspension_lvdt", plate - wheel
         )
 
     def _motion(self, name: str, expected: Array) -> EstimatedMotion:
-        """The true motion that a sensor measured, given what a replay expects of it."""
+        """Return the true motion behind a sensor's reading, from a replay's prediction of it."""
+        # The sensor is inverted for the correction alone, so the prediction keeps its sharp parts.
         sensor = getattr(self.configuration.plant, name)
         mains = self.configuration.plant.mains.frequency
-        found = estimate_motion(
+        estimate = estimate_motion(
             self._sensor(name), self._apply_sensor(name, expected), self.period, mains
         )
         return EstimatedMotion(
-            expected + undo_sensor(sensor, found.correction, self.period),
-            found.correction,
-            found.velocity_error / sensor.gain,
+            expected + undo_sensor(sensor, estimate.correction, self.period),
+            estimate.correction,
+            estimate.velocity_error / sensor.gain,
         )
 
     @property
@@ -107,10 +107,12 @@ class ComponentReplays:
 
     @cached_property
     def ground_cylinder_output(self) -> Array:
+        """Predicted position of the ground plate, m, shape (ticks,)."""
         command, cylinder = self._command("ground"), self.configuration.plant.ground_cylinder
         unloaded = replay_cylinder(cylinder, self.configuration, command, float(command[0]))
         if cylinder.compliance == 0.0:
             return unloaded
+        # The plate yields to the tyre's force, estimated from its measured deflection.
         tyre = self.configuration.plant.tyre.stiffness * (
             self._clean(self._sensor("ground_lvdt") - self.wheel)
         )
@@ -118,29 +120,33 @@ class ComponentReplays:
 
     @cached_property
     def structure_cylinder_output(self) -> Array:
+        """Predicted position of the structure plate, m, shape (ticks,)."""
         start = self.configuration.controller.start
         cylinder = self.configuration.plant.structure_cylinder
-        # A test starts with its spring uncompressed: the plate stands where the preload holds the
-        # wheel.
+        # A test starts with an uncompressed suspension: the plate stands at the wheel's height.
         plant = self.configuration.plant
         uncompressed = self._ground_start - initial_deflection(plant, self.preload)
         uncompressed += initial_yield(plant, self.preload)[0]
         unloaded = replay_cylinder(
             cylinder, self.configuration, self._command("structure"), start, uncompressed
         )
+        # The load cell measures the load of this plate directly.
         load = self._clean(self._sensor("load_cell"))
         return unloaded + yield_to_load(cylinder, load, self.period)
 
     @cached_property
     def ground_motion(self) -> EstimatedMotion:
+        """Motion of the ground plate, estimated from its LVDT."""
         return self._motion("ground_lvdt", self.ground_cylinder_output)
 
     @cached_property
     def structure_motion(self) -> EstimatedMotion:
+        """Motion of the structure plate, estimated from its LVDT."""
         return self._motion("structure_lvdt", self.structure_cylinder_output)
 
     @cached_property
     def carriage_output(self) -> Array:
+        """Predicted position of the wheel under the measured force, m, shape (ticks,)."""
         sensor = self.configuration.plant.load_cell
         force = undo_sensor(sensor, self._without_zero("load_cell"), self.period)
         return replay_carriage(
@@ -148,7 +154,7 @@ class ComponentReplays:
         )
 
     def _gas_force(self) -> Array:
-        """Of the gas spring beside the motor, N, at the travel measured."""
+        """Return the force of the gas spring at the measured travel, N, shape (ticks,)."""
         spring = self.configuration.plant.gas_spring
         if spring.force == 0.0:
             return np.zeros(self.recording.ticks)
@@ -158,19 +164,22 @@ class ComponentReplays:
 
     @cached_property
     def travel_motion(self) -> EstimatedMotion:
-        """Of plate against wheel, by the difference that the carriage's replay leaves between the
-        LVDTs."""
+        """Motion of the travel, estimated from the carriage's replay and both LVDTs."""
         mains = self.configuration.plant.mains.frequency
-        found = estimate_motion(
+        estimate = estimate_motion(
             self.wheel, self._apply_lvdts(self.carriage_output), self.period, mains
         )
         sensor = self.configuration.plant.suspension_lvdt
-        wheel = self.carriage_output + undo_sensor(sensor, found.correction, self.period)
-        error = math.hypot(self.structure_motion.velocity_error, found.velocity_error / sensor.gain)
-        return EstimatedMotion(self.structure_motion.position - wheel, found.correction, error)
+        wheel = self.carriage_output + undo_sensor(sensor, estimate.correction, self.period)
+        # Travel is a difference of two estimates with independent errors.
+        error = math.hypot(
+            self.structure_motion.velocity_error, estimate.velocity_error / sensor.gain
+        )
+        return EstimatedMotion(self.structure_motion.position - wheel, estimate.correction, error)
 
     @cached_property
     def mechanics_output(self) -> Output:
+        """Predicted force and wheel position of motor and carriage together."""
         return replay_mechanics(
             self.configuration,
             self.ground_motion.position,
@@ -184,12 +193,15 @@ class ComponentReplays:
         return compute_residual(difference, white_noise(measured), unit, self.period), difference
 
     def motor(self) -> Residual:
-        """Only where the motor is known to slide: voltage and travel do not determine its friction
-        at standstill."""
+        """Return the motor's residual at the ticks at which the motor is known to slide.
+
+        Voltage and travel do not determine its friction at standstill.
+        """
         measured, travel = self._sensor("load_cell"), self.travel_motion
         output = replay_motor(
             self.configuration, travel.position, self._command("voltage"), self.preload
         )
+        # The travel must be faster than its noise and than the error of its estimate.
         resolved = (
             white_noise(self._sensor("suspension_lvdt")) / RESOLVED_OVER
             + CERTAIN * travel.velocity_error
@@ -198,20 +210,22 @@ class ComponentReplays:
         if not slides.any():
             raise Undetermined("the motor never slides fast enough for its friction to be known")
         difference = self._clean(measured - self._apply_sensor("load_cell", output))
-        left = rms(difference[slides])
+        residual_rms = rms(difference[slides])
         floor = white_noise(measured)
         return Residual(
-            left,
+            residual_rms,
             floor,
-            left / floor if floor > 0 else math.inf,
+            residual_rms / floor if floor > 0 else math.inf,
             "N",
             band(difference * slides, self.period),
         )
 
     def carriage(self) -> Residual:
+        """Return the residual of the carriage's replay."""
         return self._residual(self.wheel, self._apply_lvdts(self.carriage_output), "m")[0]
 
     def mechanics(self) -> Residual:
+        """Return the residual of motor and carriage together, of force and wheel position."""
         force = self._apply_sensor("load_cell", self.mechanics_output.load_cell)
         pairs = {
             "load_cell": self._residual(self._sensor("load_cell"), force, "N"),
@@ -224,10 +238,12 @@ class ComponentReplays:
         )
 
     def structure_cylinder(self) -> Residual:
+        """Return the residual of the structure cylinder's replay."""
         output = self._apply_sensor("structure_lvdt", self.structure_cylinder_output)
         return self._residual(self._sensor("structure_lvdt"), output, "m")[0]
 
     def ground_cylinder(self) -> Residual:
+        """Return the residual of the ground cylinder's replay."""
         output = self._apply_sensor("ground_lvdt", self.ground_cylinder_output)
         return self._residual(self._sensor("ground_lvdt"), output, "m")[0]
 
@@ -235,6 +251,8 @@ class ComponentReplays:
         return np.column_stack([self._command(name) for name in ("ground", "structure", "force")])
 
     def controller(self) -> Residual:
+        """Return the residual of the controller's replay, against the recorded commands."""
+        # Commands have no noise: their floor is the rounding of the recording.
         control = RigControl()
         inputs = [self.recording.column(*channel) for channel in control.channels]
         replayed = control.replay(self.configuration.controller, inputs, self.period)
@@ -251,8 +269,10 @@ class ComponentReplays:
         return combine_residuals(outputs, differences, self.period)
 
     def closed_loop(self) -> Residual:
-        """The whole test again on the twin, tick against tick; drifts apart in phase wherever the
-        loop limit-cycles."""
+        """Return the residual of the whole test on the twin, tick by tick.
+
+        Where the loop has a limit cycle, twin and recording drift apart in phase.
+        """
         truth = simulate(
             without_limits(self.configuration), self._demands(), CLOSED_LOOP_SEED
         ).truth
@@ -277,4 +297,4 @@ REPLAYS: dict[str, Callable[[ComponentReplays], Residual]] = {
     "controller": ComponentReplays.controller,
     "closed_loop": ComponentReplays.closed_loop,
 }
-"""Every replay by name, in the order in which they are reported."""
+"""Replays by name, in the order in which they are reported."""

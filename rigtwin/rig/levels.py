@@ -1,5 +1,4 @@
-"""The gap as people feel it: each component's replay, and the closed loop's spectra, before and
-after a correction."""
+"""Gap before and after a correction: replays of components, and spectra of the closed loop."""
 
 from __future__ import annotations
 
@@ -28,12 +27,13 @@ from rigtwin.simulation.runner import simulate, without_limits
 COMPONENTS = ("motor", "carriage", "mechanics", "structure_cylinder", "ground_cylinder")
 """Replays whose levels are reported."""
 LOWEST, HIGHEST = 0.4, 40.0
-"""Hz, between which spectra are compared."""
+"""Frequency range in which spectra are compared, Hz."""
 BANDS_PER_OCTAVE = 2
 SEEDS = (2**31 - 1, 2**31 - 2)
-"""Of the twin's noise: runs that differ in nothing else show how far spectra differ by chance."""
+"""Seeds of the twin's noise. Runs that differ in the seed alone show the chance differences of
+spectra."""
 SHORTEST = 5.0
-"""s; spectra of shorter tests are chance."""
+"""Shortest test whose spectra are compared, s."""
 
 
 def replay_residuals(
@@ -46,12 +46,12 @@ def replay_residuals(
     evidence
         Recordings, about their nominal plant.
     progress
-        Called with the name of each replay.
+        Function that is called with the name of each replay.
 
     Returns
     -------
     tuple
-        Residual of each replay, and why others are missing.
+        Residual of each replay, and the reason for each missing one, by name.
     """
     recording = evidence.recordings[0]
     replays = ComponentReplays(recording, evidence.configurations[0])
@@ -59,7 +59,7 @@ def replay_residuals(
     if not recording.controller or OWN in recording.controller:
         left_out = dict.fromkeys(
             ("controller", "closed_loop"),
-            "the recording does not say what the controller was told to do",
+            "the recording does not contain the controller's settings",
         )
     results: dict[str, Residual] = {}
     for name, replay in REPLAYS.items():
@@ -75,27 +75,28 @@ def replay_residuals(
 def compute_levels(
     evidence: Evidence, plant: Plant, corrected: Configuration
 ) -> tuple[dict[str, Level], Level | None]:
-    """The gaps of the first recording before and after a correction.
+    """Compute the gaps of the first recording before and after a correction.
 
     Parameters
     ----------
     evidence
-        The recordings, about their nominal plant.
+        Recordings, about their nominal plant.
     plant
-        The corrected plant.
+        Corrected plant.
     corrected
-        The corrected twin: with it, and with what the signals say of their sensors.
+        Settings of the corrected twin, with the sensors as estimated from the signals.
 
     Returns
     -------
     tuple
-        Level of each component's replay, and of the closed loop's spectra, None where the test
-        is too short.
+        Level of each component's replay, and of the closed loop's spectra; None for the latter if
+        the test is too short.
     """
     recording, nominal = evidence.recordings[0], evidence.configurations[0]
     noisy: Any = corrected.plant
     for name, noise in zip(evidence.names, evidence.lines[0].noise, strict=True):
         noisy = with_parameters(noisy, name, {"white": float(noise)})
+    # Replays and closed-loop runs are independent: start all, then wait.
     with Threads() as threads:
         replays = _component_levels(recording, nominal, nominal._replace(plant=plant), threads)
         loop = _closed_loop(recording, nominal, corrected, noisy, threads)
@@ -105,24 +106,30 @@ def compute_levels(
 def _component_levels(
     recording: Recording, before: Configuration, after: Configuration, threads: Threads
 ) -> Callable[[], dict[str, Level]]:
-    """Each component's replay, in units of its noise floor; worked out until it is asked for."""
+    """Start the replays of all components; return a function that waits for their levels.
+
+    Levels are in units of each replay's noise floor.
+    """
 
     def ratios(configuration: Configuration) -> dict[str, float]:
         replays = ComponentReplays(recording, configuration)
-        found = {}
+        computed = {}
         for name in COMPONENTS:
             try:
-                found[name] = REPLAYS[name](replays).ratio
+                computed[name] = REPLAYS[name](replays).ratio
             except Undetermined:
-                continue
-        return found
+                continue  # A correction can make a replay undetermined; it then has no level.
+        return computed
 
-    found = threads.begin(ratios, dict.fromkeys((before, after)))
+    computed = threads.begin(ratios, dict.fromkeys((before, after)))
 
     def finish() -> dict[str, Level]:
-        one, *others = found
-        other = others[0] if others else one
-        return {name: Level(ratio, other.get(name, ratio), 1.0) for name, ratio in one.items()}
+        before_ratios, *remaining = computed
+        after_ratios = remaining[0] if remaining else before_ratios
+        return {
+            name: Level(ratio, after_ratios.get(name, ratio), 1.0)
+            for name, ratio in before_ratios.items()
+        }
 
     return finish
 
@@ -131,12 +138,14 @@ def _closed_loop(
     recording: Recording,
     before: Configuration,
     after: Configuration,
-    own: RigPlant,
+    noisy: RigPlant,
     threads: Threads,
 ) -> Callable[[], Level | None]:
-    """How far the twin's own run of the test is from the recording, in dB of its sensors' spectra;
-    None if the test is too short. own: the corrected plant with the noise that the recording has.
-    Worked out until it is asked for."""
+    """Start the twin's runs of the test; return a function that waits for their level.
+
+    The level is the difference of the sensors' spectra from the recording's, dB, or None if the
+    test is too short. `noisy` is the corrected plant with the noise of the recording.
+    """
     if recording.ticks * recording.period < SHORTEST:
         return lambda: None
     demands = np.column_stack(
@@ -146,31 +155,33 @@ def _closed_loop(
         np.stack([recording.column("/sensor", name) for name in Measurements._fields]),
         recording.period,
     )
-    nominal = before._replace(plant=_with_noise_of(own, before.plant))
-    corrected = after._replace(plant=own)
+    # The same noise before and after, or the correction of noise would count as a closed gap.
+    nominal = before._replace(plant=_with_noise_of(noisy, before.plant))
+    corrected = after._replace(plant=noisy)
     runs = dict.fromkeys(((nominal, SEEDS[0]), (corrected, SEEDS[0]), (corrected, SEEDS[1])))
     results = threads.begin(
         lambda run: _bands(_run(run[0], run[1], demands), recording.period), runs
     )
 
     def finish() -> Level:
-        found = dict(zip(runs, results, strict=True))
-        one, other, again = (
-            found[nominal, SEEDS[0]],
-            found[corrected, SEEDS[0]],
-            found[corrected, SEEDS[1]],
+        spectra = dict(zip(runs, results, strict=True))
+        nominal_spectra, corrected_spectra, again = (
+            spectra[nominal, SEEDS[0]],
+            spectra[corrected, SEEDS[0]],
+            spectra[corrected, SEEDS[1]],
         )
+        # The third number is the floor: two runs of the same twin with different noise.
         return Level(
-            _spectral_distance(measured, one),
-            _spectral_distance(measured, other),
-            _spectral_distance(other, again),
+            _spectral_distance(measured, nominal_spectra),
+            _spectral_distance(measured, corrected_spectra),
+            _spectral_distance(corrected_spectra, again),
         )
 
     return finish
 
 
 def _with_noise_of(noisy: RigPlant, plant: RigPlant) -> RigPlant:
-    """The plant with the white noise and hum of another's sensors."""
+    """Return a plant with the white noise and hum of another plant's sensors."""
     for name in Measurements._fields:
         like = getattr(noisy, name)
         plant = plant._replace(
@@ -184,7 +195,7 @@ def _run(configuration: Configuration, seed: int, demands: Array) -> Array:
 
 
 def _bands(signals: Array, period: float) -> Array:
-    """Mean spectral density of each signal in bands of equal ratio, shape (4, bands)."""
+    """Return the mean spectral density of each signal in logarithmic bands, shape (4, bands)."""
     edges = LOWEST * 2.0 ** (
         np.arange(math.ceil(BANDS_PER_OCTAVE * math.log2(HIGHEST / LOWEST)) + 1) / BANDS_PER_OCTAVE
     )
@@ -196,8 +207,9 @@ def _bands(signals: Array, period: float) -> Array:
     return np.array(rows)
 
 
-def _spectral_distance(one: Array, other: Array) -> float:
-    """rms difference in dB over all bands that both have."""
+def _spectral_distance(first: Array, second: Array) -> float:
+    """Return the rms difference of two spectra over all common bands, dB."""
+    # Bands without a spectral line are NaN and left out.
     with np.errstate(divide="ignore", invalid="ignore"):
-        decibels = 10.0 * np.log10(one / other)
+        decibels = 10.0 * np.log10(first / second)
     return float(np.sqrt(np.nanmean(decibels[np.isfinite(decibels)] ** 2)))

@@ -64,6 +64,7 @@ class SuspensionRig(Physics):
         return CARD
 
     def claims(self, types: Mapping[str, type], replays: Sequence[ReplayOf]) -> bool:
+        # The gas spring is optional: the real rig runs without it.
         return {"gas_spring": GasSpring} | dict(types) == TYPES
 
     def assemble(self, values: Mapping[str, Any]) -> Plant:
@@ -153,6 +154,7 @@ class SuspensionRig(Physics):
     ) -> EnergyError | None:
         from rigtwin.simulation.energy import measure_energy
 
+        # `known`: a user's controller that contains the rig's models at these settings.
         return measure_energy(recording, configuration, known)
 
     def advise_controller(self, described: Plant, corrected: Plant) -> dict[str, Any]:

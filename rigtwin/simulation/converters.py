@@ -1,5 +1,7 @@
-"""Sensors and converters between the plant and the controller: white noise, mains hum with random
-phase, 16 bits."""
+"""Sensors and analogue-to-digital converters of the suspension rig's twin.
+
+reading = round((transduced + noise + hum)/bit)·bit, with white noise and mains hum of random phase.
+"""
 
 from __future__ import annotations
 
@@ -22,47 +24,57 @@ from rigtwin.numerics.arrays import Array
 
 
 def sensors(plant: RigPlant) -> tuple[Lvdt | LoadCell, ...]:
-    """The plant's sensors in the order of Measurements."""
+    """Return the plant's sensors in the order of `Measurements`."""
     return tuple(getattr(plant, name) for name in Measurements._fields)
 
 
 def resolutions(plant: RigPlant) -> Measurements:
-    """Size of one bit of each channel, in its unit."""
+    """Return the size of one bit of each channel, in its unit."""
     return Measurements(*(sensor.resolution for sensor in sensors(plant)))
 
 
 class Sensing(NamedTuple):
-    """All transducers in the order of Measurements, and the size of one bit of each channel in its
-    unit."""
+    """Sensors and converters as compiled code takes them, in the order of `Measurements`."""
 
+    # Numba needs tuples of known length, hence four by name.
     transducers: tuple[Transducer, Transducer, Transducer, Transducer]
     states: tuple[TransducerState, TransducerState, TransducerState, TransducerState]
-    resolution: Measurements
+    resolution: Measurements  # Size of one bit of each channel, in its unit.
 
 
 def build_sensing(plant: RigPlant, period: float) -> Sensing:
-    """The plant's sensors before their first sample. period in s."""
-    one, two, three, four = (transducer(sensor, period) for sensor in sensors(plant))
+    """Return the plant's sensors before their first sample, for ticks of a period, s."""
+    ground, structure, suspension, load_cell = (
+        transducer(sensor, period) for sensor in sensors(plant)
+    )
     return Sensing(
-        (one, two, three, four),
+        (ground, structure, suspension, load_cell),
         (
-            start_transducer(one),
-            start_transducer(two),
-            start_transducer(three),
-            start_transducer(four),
+            start_transducer(ground),
+            start_transducer(structure),
+            start_transducer(suspension),
+            start_transducer(load_cell),
         ),
         resolutions(plant),
     )
 
 
 class Disturbance:
-    """Noise and hum of all sensors, one tick after another, from a seed.
+    """Noise and hum of all sensors, tick by tick, from a seed.
 
-    Every channel draws from a stream of its own, so that changing one leaves the others as they
-    were, and the numbers do not depend on how many ticks are asked for at a time.
+    Parameters
+    ----------
+    plant
+        Parameters of the rig.
+    period
+        Time from tick to tick, s.
+    seed
+        Seed of the noise and of the hum's phases.
     """
 
     def __init__(self, plant: RigPlant, period: float, seed: int) -> None:
+        # Each channel draws from a stream of its own. A change of one channel then leaves the
+        # others' noise as it was, and the numbers do not depend on the block size.
         self._sensors = sensors(plant)
         self._radians = 2 * math.pi * plant.mains.frequency * period
         self._streams = [
@@ -73,11 +85,11 @@ class Disturbance:
         self._tick = 0
 
     def change(self, plant: RigPlant) -> None:
-        """Goes on with another plant's sensors."""
+        """Continue with the noise levels of another plant."""
         self._sensors = sensors(plant)
 
     def take(self, ticks: int) -> Array:
-        """The next ticks' disturbances, shape (ticks, 4), in the channels' units."""
+        """Return noise and hum of the next ticks, in the channels' units, shape (ticks, 4)."""
         time = np.arange(self._tick, self._tick + ticks)
         self._tick += ticks
         columns = [
@@ -92,7 +104,7 @@ class Disturbance:
 
 @compilable
 def quantise(value: float, disturbance: float, resolution: float) -> float:
-    """One sample as the DAQ delivers it."""
+    """Return a sample as the converter delivers it: round((value + disturbance)/bit)·bit."""
     raw = value + disturbance
     if resolution > 0.0:
         return round(raw / resolution) * resolution
@@ -101,7 +113,11 @@ def quantise(value: float, disturbance: float, resolution: float) -> float:
 
 @compilable
 def sample_sensors(sensing: Sensing, true: Measurements, disturbance: Array) -> Measurements:
-    """All samples of one tick; disturbance has shape (4,). Advances the sensors' states."""
+    """Return all samples of one tick and advance the sensors' states.
+
+    `disturbance` is the noise and hum of this tick, in the channels' units, shape (4,).
+    """
+
     sensors, states, bits = sensing.transducers, sensing.states, sensing.resolution
     return Measurements(
         quantise(

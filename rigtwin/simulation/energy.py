@@ -1,11 +1,13 @@
-"""The energy that a hybrid test's own loop puts into what it emulates.
+"""Energy error of a hybrid test: the energy that its loop adds to the emulated system.
 
-A model commands a motion and is told a force; the rig makes another motion and carries another
-force. Where both meet, the works of the two sides differ, and what the loop adds excites the test
-as negative damping would (Mosqueda, Stojadinovic and Mahin, J. Struct. Eng. 133 (2007) 1140). At
-the structure: the filtered force that the model feels over the commanded motion, less the load
-cell's over the plate's. At the suspension: the load cell's force less the suspension model's at the
-travel there really is, over that travel.
+The model commands a motion and receives a measured force. The rig makes another motion and carries
+another force. At their interface, the works of the two sides differ, and the energy that the loop
+adds excites the test like negative damping (Mosqueda, Stojadinovic and Mahin, J. Struct. Eng. 133
+(2007) 1140):
+
+    structure   E_s = ∫ F_filtered dz_commanded − ∫ F_load_cell dz_plate
+    suspension  E_t = ∫ (F_load_cell − F_model(travel)) d travel
+    damper      E_d = ∫ d·travel'² dt
 """
 
 from __future__ import annotations
@@ -30,20 +32,27 @@ from rigtwin.signals.band import limit_band
 from rigtwin.signals.noise import remove_mains
 
 BAND = 40.0
-"""Hz, up to which a sensed travel counts: of the rate above it most is an LVDT's noise, which would
-pass for motion that the damper takes up."""
+"""Cut-off frequency of a measured travel, Hz. Above it, the rate of the travel is mostly noise of
+the LVDT, which would count as energy of the damper."""
 TRUE = ("structure", "suspension", "load_cell")
-"""What a twin knows of plate, travel and force."""
+"""Names of plate, travel and force among a twin's true values."""
 LEAST = 64
-"""Ticks of the shortest test that is looked at: a filter needs room."""
+"""Ticks of the shortest test that is evaluated. The filters need that many samples."""
 MATERIAL = 1e-6
-"""J; a damper that took up less says nothing."""
+"""Smallest energy of the damper to which an energy error is related, J."""
 
 
 @dataclass(frozen=True)
 class EnergyError:
-    """Of a model-in-the-loop test, J: what the structure's and the suspension's loops put in, below
-    0 what they took out; and what the suspension model's damper took up at the travel there was."""
+    """Energy error of a model-in-the-loop test.
+
+    Attributes
+    ----------
+    structure, suspension : float
+        Energy added by the loops of structure and suspension, J; negative if they remove energy.
+    damped : float
+        Energy that the model's suspension damper dissipates at the actual travel, J.
+    """
 
     structure: float
     suspension: float
@@ -51,13 +60,16 @@ class EnergyError:
 
     @property
     def total(self) -> float:
-        """What both loops put in, J."""
+        """Energy added by both loops, J."""
         return self.structure + self.suspension
 
     @property
     def share(self) -> float:
-        """`total` over what the damper took up: 0 where the rig is perfect, 1 where the loops undo
-        the damper; NaN where there is no damping to speak of."""
+        """`total` as a share of the damper's energy.
+
+        It is 0 for a perfect rig and 1 where the loops cancel the damper. It is NaN where the
+        damper dissipates next to nothing.
+        """
         return self.total / self.damped if self.damped > MATERIAL else math.nan
 
     def __str__(self) -> str:
@@ -70,33 +82,33 @@ class EnergyError:
 
 
 def measure_energy(
-    recording: Recording, configuration: Configuration, own: bool = False
+    recording: Recording, configuration: Configuration, foreign: bool = False
 ) -> EnergyError | None:
-    """The energy error of a recorded test.
+    """Compute the energy error of a recorded test.
 
     Parameters
     ----------
     recording
-        Of the suspension rig. What was sensed is without noise where a twin knows it.
+        Recording of the suspension rig. True values of a twin are used where it has them.
     configuration
-        The settings of the test.
-    own
-        Whether a controller of one's own has the rig's models in it, at these settings, and
-        commands other than what they say. Where the models' plate should be is worked out from
-        what was sensed then, as it is where the settings compensate the plate's delay.
+        Settings of the test.
+    foreign
+        Whether a controller of the user contains the rig's models at these settings, and commands
+        something else than they ask for. The models' motion is then recomputed from the sensors,
+        as it is where the settings compensate the plate's delay.
 
     Returns
     -------
     EnergyError or None
-        None where no model closes the loop, the travel of its suspension is not the rig's own
-        (single mass tests), or the controller was another and nothing is known of it.
+        None if no model closes the loop, if its suspension's travel is not the rig's (single-mass
+        tests), or if the controller is unknown.
     """
     settings = configuration.controller
     if settings.mode != Mode.MIL or settings.travel != Travel.WHEEL or recording.ticks < LEAST:
         return None
-    if not own and (not recording.controller or OWN in recording.controller):
+    if not foreign and (not recording.controller or OWN in recording.controller):
         return None
-    if own or settings.plate_compensator != PlateCompensator.NONE:
+    if foreign or settings.plate_compensator != PlateCompensator.NONE:
         plain = settings._replace(plate_compensator=PlateCompensator.NONE)
         control = RigControl()
         inputs = [recording.column(*channel) for channel in control.channels]
@@ -107,7 +119,7 @@ def measure_energy(
     if all(name in truth for name in TRUE):
         plate, travel, force = (truth[name] for name in TRUE)
     else:
-        # The mains' line is in force and motion alike, so that their product does not average out.
+        # Force and motion both contain the mains hum, so its product does not average out.
         mains = configuration.plant.mains.frequency
         plate, travel, force = (
             remove_mains(recording.column("/sensor", name), recording.period, mains)
@@ -123,7 +135,7 @@ def measure_energy(
         force=force,
         felt=recording.column("/sensor", "load_cell"),
         rate=np.gradient(travel, recording.period),
-        body=np.gradient(wanted, recording.period),
+        body_rate=np.gradient(wanted, recording.period),
     )
     return EnergyError(*works)
 
@@ -138,27 +150,33 @@ def _work(
     force: Array,
     felt: Array,
     rate: Array,
-    body: Array,
+    body_rate: Array,
 ) -> tuple[float, float, float]:
-    """wanted: the plate's commanded motion; felt: the force as the controller gets it; rate: of
-    the travel; body: of the commanded motion."""
+    """Return the energies of structure, suspension and damper, J.
+
+    `wanted` is the commanded motion of the plate, m, and `body_rate` its velocity, m/s. `felt` is
+    the force that the controller reads, N, `force` the actual one. `rate` is that of the travel,
+    m/s. All have shape (ticks,).
+    """
     structure = suspension = damped = 0.0
     filtered = felt[0]
     model_before = rig_before = error_before = 0.0
     for tick in range(len(wanted)):
+        # The model feels the force behind the controller's filter.
         filtered = low_pass(filtered, felt[tick], settings.filter_force, period)
-        beside = 0.0
+        gas = 0.0
         if settings.gas_force > 0.0:
-            beside = gas_force(
+            gas = gas_force(
                 settings.gas_force, settings.gas_length, settings.gas_exponent, -travel[tick]
             )
-        model, rig = filtered + beside, force[tick] + beside
-        should = suspension_force(settings, travel[tick], rate[tick])
-        should -= skyhook_force(settings, body[tick], rate[tick])
-        error = force[tick] - should
+        model, rig = filtered + gas, force[tick] + gas
+        modelled = suspension_force(settings, travel[tick], rate[tick])
+        modelled -= skyhook_force(settings, body_rate[tick], rate[tick])
+        error = force[tick] - modelled
         damping = settings.suspension_damping
         if settings.skyhook == Skyhook.SEMI_ACTIVE:
-            damping += semi_active_damping(settings, body[tick], rate[tick])
+            damping += semi_active_damping(settings, body_rate[tick], rate[tick])
+        # Work by the trapezoidal rule.
         if tick > 0:
             structure += 0.5 * (model_before + model) * (wanted[tick] - wanted[tick - 1])
             structure -= 0.5 * (rig_before + rig) * (plate[tick] - plate[tick - 1])

@@ -1,5 +1,4 @@
-"""What an experiment is: a configuration, and what it demands of the machine; and those that a
-machine has."""
+"""Experiments: named tests with a configuration and demands, and the experiments of a machine."""
 
 from __future__ import annotations
 
@@ -19,23 +18,23 @@ from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
 
 Demands = Array | Mapping[str, Array]
-"""Of the suspension rig, the columns of `controllers.Demand` at every tick, shape (ticks, 3):
-ground m, structure m, force N, the last two for imposed tests only. Of another machine, each
-demanded channel's values by its name, shape (ticks,)."""
+"""Demands of a test. On the suspension rig: columns of `controllers.Demand` at every tick, ground
+(m), structure (m) and force (N), shape (ticks, 3); the last two for imposed tests only. On another
+machine: demanded channel → values, shape (ticks,)."""
 
 
 @dataclass(frozen=True)
 class Experiment:
-    """A test that can be run by name; picklable, if its demands are a function of a module.
+    """Test that can be run by name. It can be pickled if its demands are a module's function.
 
     Parameters
     ----------
     name, summary, source : str
-        What it is called, what it does, where it comes from.
+        Name, one line about the test, and its origin.
     configuration : Configuration
-        The machine, its controller and the clocks.
+        Settings of machine, controller and timing.
     demands : callable
-        Of a configuration and a seed, what it demands.
+        Function of a configuration and a seed that returns the demands.
     """
 
     name: str
@@ -47,36 +46,48 @@ class Experiment:
 
 @dataclass(frozen=True)
 class FormulaDemands:
-    """Demands as a description writes them: channel → a formula of `time`."""
+    """Demands of a description.
+
+    Attributes
+    ----------
+    formulas : mapping of str to str
+        Channel → formula of `time`.
+    """
 
     formulas: Mapping[str, str]
 
     def __call__(self, configuration: Configuration, seed: int) -> dict[str, Array]:
         time = np.arange(configuration.ticks) * configuration.timing.period
-        found = {}
+        demands = {}
         for name, text in self.formulas.items():
             compiled = formula(text, {})
+            # A constant formula has no input, but still needs one to have a length.
             inputs = [time] * max(len(compiled.inputs), 1)
             values = compiled.replayed({}, inputs, configuration.timing.period)
             if not np.isfinite(values).all():
                 at = time[np.argmin(np.isfinite(values))]
                 raise RigtwinError(f"demand {name}: {text!r:.60} is not finite at {at:.3f} s")
-            found[name] = values
-        return found
+            demands[name] = values
+        return demands
 
 
 def experiments_of(machine: Machine) -> dict[str, Experiment]:
-    """The experiments of a machine.
+    """Return the experiments of a machine.
 
     Parameters
     ----------
     machine
-        Its description.
+        Description of the machine.
 
     Returns
     -------
     dict
-        Name → experiment: those of the Python module that the description names, or its own tables.
+        Name → experiment, from the Python module that the description names, or from its tables.
+
+    Raises
+    ------
+    RigtwinError
+        If the Python module cannot be imported or has no `EXPERIMENTS`.
     """
     if isinstance(machine.experiments, str):
         try:
@@ -88,6 +99,7 @@ def experiments_of(machine: Machine) -> dict[str, Experiment]:
             ) from None
         if machine.plant == RigPlant():
             return dict(known)
+        # The module is written for the nominal rig: transfer its settings to this machine.
         base = machine.configuration
         return {
             name: replace(e, configuration=rebase(e.configuration, base))
@@ -100,6 +112,7 @@ def _from_table(machine: Machine, name: str, table: Mapping[str, Any]) -> Experi
     base = machine.configuration
     clocks = {key: float(table[key]) for key in ("duration", "period") if key in table}
     timing = base.timing._replace(**clocks)
+    # Keep the timestep close to the description's, with a whole number of steps per tick.
     timing = timing._replace(
         timestep=timing.period / max(1, round(timing.period / base.timing.timestep))
     )
@@ -114,27 +127,27 @@ def _from_table(machine: Machine, name: str, table: Mapping[str, Any]) -> Experi
 
 
 def find_experiment(machine: Machine, name: str) -> Experiment:
-    """The experiment of a name.
+    """Return an experiment by its name.
 
     Parameters
     ----------
     machine
-        Its description.
+        Description of the machine.
     name
-        Of the experiment.
+        Name of the experiment.
 
     Returns
     -------
     Experiment
-        As described.
+        Experiment of that name.
 
     Raises
     ------
     RigtwinError
-        Listing what there is, for an unknown name.
+        If the name is unknown; the message lists the experiments.
     """
     known = experiments_of(machine)
     if name not in known:
-        there = f"there are {', '.join(known)}" if known else f"{machine.name} describes none"
-        raise RigtwinError(f"unknown experiment {name!r}; {there}")
+        available = f"there are {', '.join(known)}" if known else f"{machine.name} describes none"
+        raise RigtwinError(f"unknown experiment {name!r}; {available}")
     return known[name]

@@ -1,5 +1,8 @@
-"""The ideal emulated system: what a test would do if the rig were perfect, with no friction, no
-noise and no delay."""
+"""Ideal emulated system: the motion of a test on a perfect rig, without friction, noise and delay.
+
+The linear part z' = A·z + B·u is sampled exactly for inputs held over each step. The forces of a
+semi-active damper and of a gas spring are not linear; they are held over each of `SUBSTEPS`.
+"""
 
 from __future__ import annotations
 
@@ -18,15 +21,26 @@ from rigtwin.numerics.compiling import kernel
 from rigtwin.simulation.plant import initial_deflection
 
 SUBSTEPS = 4
-"""Steps a tick where a semi-active damper or a gas spring's force is held over each; a linear
-suspension is exact with one."""
+"""Steps per tick with a semi-active damper or gas spring. A linear suspension is exact with one."""
 
 
 @dataclass(frozen=True)
 class Ideal:
-    """Sprung position and velocity (m, m/s; of the beams' centre), wheel position (m), suspension
-    force (N), and what the wing does relative to the ground (m, at 0, 1, 2 and 3 beams from the
-    centre); shape (ticks,), wing (ticks, 4) or None."""
+    """Motion of the ideal system.
+
+    Attributes
+    ----------
+    structure, velocity : Array
+        Position and velocity of the sprung mass, or of the beams' centre, m and m/s, shape
+        (ticks,).
+    wheel : Array
+        Position of the wheel, m, shape (ticks,).
+    force : Array
+        Force of the suspension, N, shape (ticks,).
+    wing : Array or None
+        Position of the wing at 0, 1, 2 and 3 beams from the centre, m, shape (ticks, 4). None for a
+        rigid body.
+    """
 
     structure: Array
     velocity: Array
@@ -35,24 +49,24 @@ class Ideal:
     wing: Array | None
 
     def acceleration(self, period: float) -> Array:
-        """Of the structure's centre, m/s²."""
+        """Return the acceleration of the structure's centre, m/s², shape (ticks,)."""
         return np.gradient(self.velocity, period)
 
 
 @dataclass(frozen=True)
 class _Structure:
-    """The sprung body in modal form: squared angular frequencies, damping rates, centre shape,
-    gravity's modal force, modal displacements at the start, and the wing's shape."""
+    """Sprung body in modal form, with mass-normalised modes."""
 
-    squares: Array
-    damping: Array
-    centre: Array
-    weight: Array
-    start: Array
-    wing: Array | None
+    squares: Array  # Squared angular frequencies, 1/s², shape (modes,).
+    damping: Array  # Damping rates 2ζω, 1/s, shape (modes,).
+    centre: Array  # Mode shapes at the centre, 1/√kg, shape (modes,).
+    weight: Array  # Modal forces of gravity, N/√kg, shape (modes,).
+    start: Array  # Modal displacements at the start, m·√kg, shape (modes,).
+    wing: Array | None  # Mode shapes along the wing, shape (modes, 4), or None.
 
 
 def _structure(settings: Settings) -> _Structure:
+    """Return the cross of beams by its modes, or a rigid body as one mode of frequency zero."""
     if settings.structure == Structure.BEAM:
         model = modes(settings, 1e-3)
         squares = (2 * np.pi * model.frequencies) ** 2
@@ -76,9 +90,23 @@ def _structure(settings: Settings) -> _Structure:
 
 
 def simulate_ideal(configuration: Configuration, ground: Array) -> Ideal:
-    """The system that a test emulates, started as the rig starts: a body or a cross of beams on a
-    spring and damper with skyhook, on the ground (single mass) or on a wheel and its tyre (quarter
-    car). ground: m, held over each tick."""
+    """Simulate the system that a test emulates, from the rig's initial state.
+
+    A body or a cross of beams stands on a spring and damper with skyhook, either on the ground
+    (single mass) or on a wheel with a tyre (quarter car).
+
+    Parameters
+    ----------
+    configuration
+        Settings of the test.
+    ground
+        Ground motion, m, held over each tick, shape (ticks,).
+
+    Returns
+    -------
+    Ideal
+        Motion and suspension force at every tick.
+    """
     settings, plant, period = (
         configuration.controller,
         configuration.plant,
@@ -90,13 +118,15 @@ def simulate_ideal(configuration: Configuration, ground: Array) -> Ideal:
     size = 2 * count + (2 if on_wheel else 0)
     k, b = settings.suspension_stiffness, settings.suspension_damping
     sky = settings.skyhook_damping if settings.skyhook == Skyhook.ACTIVE else 0.0
-    # Rows of the state that give the sprung centre's and the wheel's position and velocity; inputs:
-    # ground, its rate, one, and what is not linear: the force of a semi-active damper less that of
-    # a gas spring.
+    # State z: modal displacements, modal velocities, wheel position and velocity. The rows below
+    # select position and velocity of the sprung centre and of the wheel.
+    # Inputs u: ground, its rate, one (for constants), and the nonlinear force: that of a
+    # semi-active damper less that of a gas spring.
     rate = np.diff(ground, prepend=ground[0]) / period
     inputs = np.column_stack([ground, rate, np.ones_like(ground), np.zeros_like(ground)])
     position, velocity, wheel, wheel_rate = (np.zeros(size) for _ in range(4))
     position[:count], velocity[count : 2 * count] = body.centre, body.centre
+    # Suspension force = force · z + force_in · u, downwards on the body by −1.
     force, force_in = (
         -k * position - (b + sky) * velocity,
         np.array([0.0, 0.0, settings.preload, -1.0]),
@@ -106,16 +136,7 @@ def simulate_ideal(configuration: Configuration, ground: Array) -> Ideal:
         force += k * wheel + b * wheel_rate
     else:
         force_in[:2] = k, b
-    a, entry = np.zeros((size, size)), np.zeros((size, 4))
-    for mode in range(count):
-        a[mode, count + mode] = 1.0
-        a[count + mode, mode], a[count + mode, count + mode] = (
-            -body.squares[mode],
-            -body.damping[mode],
-        )
-        a[count + mode] += body.centre[mode] * force
-        entry[count + mode] = body.centre[mode] * force_in
-        entry[count + mode, 2] += body.weight[mode]
+    a, entry = _body_equations(body, force, force_in, size)
     if on_wheel:
         stiffness, damping, mass = plant.tyre.stiffness, plant.tyre.damping, plant.carriage.mass
         a[-2, -1] = 1.0
@@ -130,7 +151,7 @@ def simulate_ideal(configuration: Configuration, ground: Array) -> Ideal:
         SUBSTEPS if settings.skyhook == Skyhook.SEMI_ACTIVE or settings.gas_force > 0.0 else 1
     )
     transition, step = _discretise(a, entry, period / substeps)
-    states, besides = np.empty((len(ground), size)), np.zeros(len(ground))
+    states, nonlinear = np.empty((len(ground), size)), np.zeros(len(ground))
     rows = np.stack([velocity, velocity - wheel_rate, position - wheel])
     _simulate(
         settings=settings,
@@ -142,9 +163,9 @@ def simulate_ideal(configuration: Configuration, ground: Array) -> Ideal:
         start=start,
         substeps=substeps,
         states=states,
-        besides=besides,
+        nonlinear=nonlinear,
     )
-    inputs[:, 3] = besides
+    inputs[:, 3] = nonlinear
     wing = None if body.wing is None else states[:, :count] @ body.wing
     return Ideal(
         states @ position,
@@ -155,7 +176,26 @@ def simulate_ideal(configuration: Configuration, ground: Array) -> Ideal:
     )
 
 
+def _body_equations(
+    body: _Structure, force: Array, force_in: Array, size: int
+) -> tuple[Array, Array]:
+    """Return A and B with the modal equations q'' + d·q' + ω²·q = centre·F + weight filled in."""
+    count = len(body.squares)
+    a, entry = np.zeros((size, size)), np.zeros((size, 4))
+    for mode in range(count):
+        a[mode, count + mode] = 1.0
+        a[count + mode, mode], a[count + mode, count + mode] = (
+            -body.squares[mode],
+            -body.damping[mode],
+        )
+        a[count + mode] += body.centre[mode] * force
+        entry[count + mode] = body.centre[mode] * force_in
+        entry[count + mode, 2] += body.weight[mode]
+    return a, entry
+
+
 def _discretise(a: Array, entry: Array, period: float) -> tuple[Array, Array]:
+    """Return transition and input matrix of z' = A·z + B·u with u held over a period, s."""
     count = len(a)
     both = np.zeros((count + entry.shape[1],) * 2)
     both[:count, :count], both[:count, count:] = a, entry
@@ -176,15 +216,18 @@ def _simulate(
     start: Array,
     substeps: int,
     states: Array,
-    besides: Array,
+    nonlinear: Array,
 ) -> None:
-    """States at every tick under inputs held over each. rows: give of a state the sprung velocity,
-    the suspension's velocity and its travel, the last two less the ground's where there is no
-    wheel. besides: the force of what is not linear."""
+    """Compute the states at every tick.
+
+    `rows` @ state gives the sprung velocity and the suspension's velocity and travel; without a
+    wheel, the ground's motion is still to be subtracted from the last two. The nonlinear force is
+    written to `nonlinear`, N, shape (ticks,).
+    """
     state = start.copy()
-    given = np.zeros(inputs.shape[1])
+    held = np.zeros(inputs.shape[1])
     for tick in range(len(inputs)):
-        given[:] = inputs[tick]
+        held[:] = inputs[tick]
         for part in range(substeps):
             if substeps > 1:
                 sprung, velocity, travel = (
@@ -193,15 +236,15 @@ def _simulate(
                     np.dot(rows[2], state),
                 )
                 if not on_wheel:
-                    velocity, travel = velocity - given[1], travel - given[0]
-                given[3] = 0.0
+                    velocity, travel = velocity - held[1], travel - held[0]
+                held[3] = 0.0
                 if settings.skyhook == Skyhook.SEMI_ACTIVE:
-                    given[3] += semi_active_damping(settings, sprung, velocity) * velocity
+                    held[3] += semi_active_damping(settings, sprung, velocity) * velocity
                 if settings.gas_force > 0.0:
-                    given[3] -= gas_force(
+                    held[3] -= gas_force(
                         settings.gas_force, settings.gas_length, settings.gas_exponent, -travel
                     )
             if part == 0:
                 states[tick] = state
-                besides[tick] = given[3]
-            state = np.dot(transition, state) + np.dot(step, given)
+                nonlinear[tick] = held[3]
+            state = np.dot(transition, state) + np.dot(step, held)

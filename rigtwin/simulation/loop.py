@@ -1,7 +1,7 @@
-"""The control loop: read → update → write, tick by tick, until the test is over or a limit trips.
+"""Control loop: read → update → write, tick by tick, until the test ends or a limit trips.
 
-`run` drives any rig through its four verbs. `run_compiled` does the same to a twin without leaving
-compiled code; both give the same numbers.
+`run` drives any rig through its four verbs. `run_compiled` drives a twin without leaving compiled
+code. Both give the same numbers.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from contextlib import nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -31,7 +31,6 @@ from rigtwin.description.configuration import Configuration
 from rigtwin.description.control import set_up
 from rigtwin.description.settings import Safety
 from rigtwin.errors import RigtwinError
-from rigtwin.interruptions import defer_sigint
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
 from rigtwin.simulation.converters import Sensing, sample_sensors
@@ -47,15 +46,26 @@ from rigtwin.simulation.safety import (
 from rigtwin.simulation.twin import Twin
 
 BLOCK = 250
-"""Ticks handed on at a time, so what is not yet in a recording is at most a quarter of a second."""
+"""Ticks in a block. At most a quarter of a second is not yet in the recording."""
 
 
 @dataclass(frozen=True)
 class Block:
-    """Some consecutive ticks. first: number of the first; commands, measurements, truth: shape
-    (ticks, 4), truth None for a rig that does not know it; trip: why the test ends with this
-    block's last tick, or Trip.NONE; column: that tripped, of Measurements or, from 4 on, of
-    Commands."""
+    """Consecutive ticks of a test.
+
+    Attributes
+    ----------
+    first : int
+        Number of the first tick.
+    commands, measurements : Array
+        Columns of `Commands` and `Measurements`, shape (ticks, 4).
+    truth : Array or None
+        Readings of ideal sensors, shape (ticks, 4); None for a rig that does not know them.
+    trip : Trip
+        Limit that ended the test at the last tick, or Trip.NONE.
+    column : int
+        Column that tripped, of `Measurements`, or from 4 on of `Commands`.
+    """
 
     first: int
     commands: Array
@@ -69,13 +79,13 @@ Tick = Callable[[Measurements, Demand], Commands]
 """One tick of a controller: a function, or the bound method `tick` of an object."""
 
 
-def check_commands(given: object) -> Commands:
-    """Commands that can be written to a rig.
+def check_commands(answer: object) -> Commands:
+    """Return a controller's answer as commands that can be written to a rig.
 
     Parameters
     ----------
-    given
-        What a controller returned.
+    answer
+        Value that the controller returned.
 
     Returns
     -------
@@ -85,29 +95,29 @@ def check_commands(given: object) -> Commands:
     Raises
     ------
     RigtwinError
-        For anything else.
+        If the answer is not four finite numbers.
     """
     try:
-        commands = Commands(*(float(value) for value in given))  # type: ignore[attr-defined]
+        commands = Commands(*(float(value) for value in answer))  # type: ignore[attr-defined]
     except (TypeError, ValueError, OverflowError):
         commands = Commands(math.nan, math.nan, math.nan, math.nan)
     if not all(math.isfinite(value) for value in commands):
         names = ", ".join(Commands._fields)
-        shown = " ".join(str(given)[:200].split())[:80]
+        shown = " ".join(str(answer)[:200].split())[:80]
         raise RigtwinError(f"the controller gave {shown}; expected finite {names}")
     return commands
 
 
 class TickController(Protocol):
-    """A controller of one's own: an object with one method."""
+    """Protocol of a user's controller: an object with one method."""
 
     def tick(self, measured: Measurements, demand: Demand) -> Commands:
-        """The commands of a tick for what was measured and what the test demands."""
+        """Return the commands of a tick from measurements and demands."""
         ...
 
 
 class RigController:
-    """The controller of the rig, tick by tick in Python."""
+    """Controller of the rig, tick by tick in Python."""
 
     def __init__(self, configuration: Configuration) -> None:
         self._controlling = set_up(configuration.controller, configuration.timing.period)
@@ -121,79 +131,92 @@ class RigController:
 def run(
     rig: Rig, configuration: Configuration, demands: Array, tick: Tick | None = None
 ) -> Iterator[Block]:
-    """Runs a test tick by tick.
+    """Run a test tick by tick.
 
     Parameters
     ----------
     rig
         Twin, card or replay.
     configuration
-        Of the test.
+        Settings of the test.
     demands
-        Columns of controllers.Demand, shape (ticks, 3).
+        Columns of `controllers.Demand`, shape (ticks, 3).
     tick
-        A controller of one's own; by default the rig's with the configuration's settings.
+        Controller of the user. Default: the rig's, with the configuration's settings.
 
     Yields
     ------
     Block
-        Consecutive ticks; the last says why the test ended.
+        Consecutive ticks; the last block says why the test ended.
 
     Raises
     ------
     RigtwinError
-        If a controller of one's own gives anything but four finite commands.
+        If the user's controller returns anything but four finite commands.
     """
-    own = tick is not None
+    foreign = tick is not None
     tick, limit_memory = tick or RigController(configuration).tick, empty_memory()
     rig.start()
     try:
         for first in range(0, len(demands), BLOCK):
-            rows: list[tuple[Commands, Measurements]] = []
-            truth: list[Measurements] = []
-            trip, column = Trip.NONE, 0
-            failure: Exception | None = None
-            for demand in demands[first : first + BLOCK]:
-                measured = rig.read()
-                if isinstance(rig, Twin) and rig.misses(1)[0]:
-                    commands = rig.held
-                else:
-                    try:
-                        commands = tick(measured, Demand(*demand.tolist()))
-                        commands = check_commands(commands) if own else commands
-                    except Exception as error:
-                        # What was recorded before is handed on first.
-                        failure = error
-                        break
-                if isinstance(rig, Twin):
-                    truth.append(rig.truth)
-                rows.append((commands, measured))
-                number, column = judge_limits(
-                    configuration.safety,
-                    configuration.timing.period,
-                    limit_memory,
-                    measured,
-                    commands,
-                )
-                trip = Trip(number)
-                if trip != Trip.NONE:
-                    break
-                rig.write(commands)
-            if rows:
-                yield Block(
-                    first,
-                    np.array([commands for commands, _ in rows]),
-                    np.array([measured for _, measured in rows]),
-                    np.array(truth) if truth else None,
-                    trip,
-                    column,
-                )
+            block, failure = _run_block(
+                rig, configuration, demands[first : first + BLOCK], tick, foreign, limit_memory
+            )
+            # A failing controller must not lose the ticks before its failure.
+            if len(block.commands):
+                yield replace(block, first=first)
             if failure is not None:
                 raise failure
-            if trip != Trip.NONE:
+            if block.trip != Trip.NONE:
                 return
     finally:
         rig.stop()
+
+
+def _run_block(
+    rig: Rig,
+    configuration: Configuration,
+    demands: Array,
+    tick: Tick,
+    foreign: bool,
+    limit_memory: LimitMemory,
+) -> tuple[Block, Exception | None]:
+    """Run the ticks of one block; return them and the error of the controller, if any."""
+    rows: list[tuple[Commands, Measurements]] = []
+    truth: list[Measurements] = []
+    trip, column = Trip.NONE, 0
+    failure: Exception | None = None
+    for demand in demands:
+        measured = rig.read()
+        if isinstance(rig, Twin) and rig.misses(1)[0]:
+            commands = rig.held
+        else:
+            try:
+                commands = tick(measured, Demand(*demand.tolist()))
+                commands = check_commands(commands) if foreign else commands
+            except Exception as error:
+                failure = error
+                break
+        if isinstance(rig, Twin):
+            truth.append(rig.truth)
+        rows.append((commands, measured))
+        # Limits see a tick's commands before the rig does, so a bad command is never written.
+        number, column = judge_limits(
+            configuration.safety, configuration.timing.period, limit_memory, measured, commands
+        )
+        trip = Trip(number)
+        if trip != Trip.NONE:
+            break
+        rig.write(commands)
+    block = Block(
+        0,
+        np.array([commands for commands, _ in rows]),
+        np.array([measured for _, measured in rows]),
+        np.array(truth) if truth else None,
+        trip,
+        column,
+    )
+    return block, failure
 
 
 @kernel
@@ -213,9 +236,13 @@ def _ticks(
     measured_out: Array,
     truth_out: Array,
 ) -> tuple[int, int, int]:
-    """Ticks done, the number of a Trip and the column. Gives back plain numbers and arrays only:
-    making any other Python object can run into a pending Ctrl-C, which compiled code does not
-    survive."""
+    """Run ticks in compiled code; return their number, the number of a Trip and its column.
+
+    The first tick may have been missed, hence `held`, the commands before it. `memory` and
+    `plate_memory` hold the controller's packed state and are changed in place.
+    """
+    # Only plain numbers and arrays are returned: making any other Python object can run into a
+    # pending Ctrl-C, which compiled code does not survive.
     state = unpacked(to_fixed_tuple(memory, SIZE), plate_memory)  # type: ignore[call-arg]
     done, trip, column = 0, Trip.NONE.value, 0
     for tick in range(len(demands)):
@@ -225,6 +252,7 @@ def _ticks(
         commands = held
         if not missed[tick]:
             state, commands = update(controlling, state, measured, demand)
+        # A missed tick is recorded with the commands that stay in force.
         for signal in range(4):
             commands_out[tick, signal] = commands[signal]
             measured_out[tick, signal] = measured[signal]
@@ -245,23 +273,23 @@ def _ticks(
 def run_compiled(
     twin: Twin, configuration: Configuration, demands: Array, block: int = BLOCK
 ) -> Iterator[Block]:
-    """Runs a test on the twin in compiled code; the same blocks as `run`, several times as fast.
+    """Run a test on the twin in compiled code: the blocks of `run`, several times as fast.
 
     Parameters
     ----------
     twin
-        At its start.
+        Twin at its start.
     configuration
-        Of the test.
+        Settings of the test.
     demands
-        Columns of controllers.Demand, shape (ticks, 3).
+        Columns of `controllers.Demand`, shape (ticks, 3).
     block
-        Ticks handed on at a time.
+        Ticks in a block.
 
     Yields
     ------
     Block
-        Consecutive ticks; the last says why the test ended.
+        Consecutive ticks; the last block says why the test ended.
     """
     controlling = set_up(configuration.controller, configuration.timing.period)
     start, limit_memory = initial_state(controlling), empty_memory_arrays()
@@ -269,7 +297,8 @@ def run_compiled(
     for first in range(0, len(demands), block):
         asked = np.ascontiguousarray(demands[first : first + block], dtype=np.float64)
         commands, measured, truth = (np.empty((len(asked), 4)) for _ in range(3))
-        # The first may have to be compiled, which can be interrupted.
+        # Ctrl-C is deferred while compiled code runs. The first block may have to be compiled
+        # first, which takes seconds and must stay interruptible.
         with defer_sigint() if first > 0 else nullcontext():
             done, number, column = _ticks(
                 plant=twin.simulation.state,

@@ -1,5 +1,4 @@
-"""The mechanics: the MJCF model with a plant's values written into it, and the views of it that
-compiled code needs."""
+"""Mechanics of the suspension rig: the MJCF model with a plant's values, and views of its data."""
 
 from __future__ import annotations
 
@@ -14,47 +13,49 @@ from rigtwin.components import RigPlant
 from rigtwin.numerics.arrays import Array
 
 SCENE = files("models") / "xml" / "scene.xml"
-"""The rig with lights and cameras."""
+"""MJCF of the rig with lights and cameras."""
 MECHANICS = files("models") / "xml" / "suspension_rig.xml"
-"""The rig alone."""
+"""MJCF of the rig alone."""
 
 
 class Handles(NamedTuple):
-    """Addresses of MuJoCo's structures, live views of their arrays, and where each part stands in
-    them."""
+    """Addresses of MuJoCo's structures and live views of their arrays, for compiled code."""
 
-    model: int
-    data: int
-    timestep: float
-    qpos: Array
-    qvel: Array
-    activation: Array
-    control: Array
-    applied: Array
-    sensors: Array
-    ground: int
-    carriage: int
-    structure: int
-    load_cell: int
-    motor_constant: float
-    constraint: Array
-    passive: Array
-    rail_friction: Array
-    motor_friction: Array
-    motor_bias: Array
-    tyre: Array
-    tyre_scale: float
+    model: int  # Address of MuJoCo's model.
+    data: int  # Address of MuJoCo's data.
+    timestep: float  # Integration step, s.
+    qpos: Array  # Positions, m.
+    qvel: Array  # Velocities, m/s.
+    activation: Array  # State of the motor's first-order lag, V.
+    control: Array  # Command of the motor, V.
+    applied: Array  # Forces applied to the joints, N.
+    sensors: Array  # Readings of MuJoCo's sensors.
+    ground: int  # Index of the ground plate's joint.
+    carriage: int  # Index of the carriage's joint.
+    structure: int  # Index of the structure plate's joint.
+    load_cell: int  # Index of the load cell among the sensors.
+    motor_constant: float  # Force per unit of voltage, N/V.
+    constraint: Array  # Forces of friction and contact, N.
+    passive: Array  # Forces of springs and dampers, N.
+    rail_friction: Array  # View of the rail's dry friction, N, shape (1,).
+    motor_friction: Array  # View of the motor's dry friction, N, shape (1,).
+    motor_bias: Array  # View of the motor's constant force, N.
+    tyre: Array  # View of the tyre's `solref`, −stiffness and −damping times `tyre_scale`.
+    tyre_scale: float  # Factor from `tyre_scale`, 1/kg.
 
 
 @cache
 def _nominal() -> mujoco.MjModel:
-    """The model as the XML has it, compiled once; never changed. With its lights and cameras, so
-    that a running twin can be looked at; they change no digit of its motion."""
+    """Return the model of the MJCF, compiled once and never changed.
+
+    It has lights and cameras, so that a running twin can be rendered. They change no digit of its
+    motion.
+    """
     return mujoco.MjModel.from_xml_path(str(SCENE))
 
 
 def build(plant: RigPlant, timestep: float) -> mujoco.MjModel:
-    """The mechanics of that plant. timestep in s."""
+    """Return the mechanics of a plant, integrated with a timestep, s."""
     model = copy(_nominal())
     model.opt.timestep = timestep
     model.body("carriage").mass = plant.carriage.mass
@@ -64,7 +65,8 @@ def build(plant: RigPlant, timestep: float) -> mujoco.MjModel:
     model.dof_damping[carriage] = plant.rail.viscous
     model.tendon_frictionloss[rod] = plant.motor.coulomb
     model.tendon_damping[rod] = plant.motor.viscous
-    # Two timesteps: the fastest friction constraint MuJoCo takes as it is, so the least creep.
+    # MuJoCo regularises dry friction by a time constant and raises values below two timesteps. The
+    # smallest one gives the least creep of a sticking contact.
     model.dof_solref[:, 0] = 2 * timestep
     model.tendon_solref_fri[:, 0] = 2 * timestep
     scale = tyre_scale(model)
@@ -78,12 +80,11 @@ def build(plant: RigPlant, timestep: float) -> mujoco.MjModel:
 
 
 def tyre_scale(model: mujoco.MjModel) -> float:
-    """What to multiply a stiffness (N/m) or damping (Ns/m) by for −solref of the tyre's contact,
-    1/kg.
+    """Return the factor from a stiffness (N/m) or damping (Ns/m) to −solref of the tyre, 1/kg.
 
     MuJoCo solves f·(A + R) = −k·r − b·v with R = (1 − d)/d·D, k and b = −solref/d, where d is the
     impedance, A the contact's exact inverse mass and D its approximate one (MuJoCo documentation,
-    computation, "Parameters"). Solved for solref here.
+    computation, "Parameters"). This function solves that for solref.
     """
     pair = model.pair("tyre")
     impedance = float(pair.solimp[0])
@@ -93,13 +94,13 @@ def tyre_scale(model: mujoco.MjModel) -> float:
     return impedance * exact + (1.0 - impedance) * approximate
 
 
-def _one(number: int) -> slice:
-    """The place of one element, as a view."""
+def _single(number: int) -> slice:
+    """Return the slice of one element, which indexes it as a view."""
     return slice(int(number), int(number) + 1)
 
 
 def handles(model: mujoco.MjModel, data: mujoco.MjData) -> Handles:
-    """Views of one simulation. They live as long as `model` and `data` do."""
+    """Return the views of one simulation. They are valid as long as `model` and `data` live."""
     return Handles(
         model=model._address,
         data=data._address,
@@ -117,8 +118,8 @@ def handles(model: mujoco.MjModel, data: mujoco.MjData) -> Handles:
         motor_constant=float(model.actuator("motor").gainprm[0]),
         constraint=data.qfrc_constraint,
         passive=data.qfrc_passive,
-        rail_friction=model.dof_frictionloss[_one(model.joint("carriage").dofadr[0])],
-        motor_friction=model.tendon_frictionloss[_one(model.tendon("motor").id)],
+        rail_friction=model.dof_frictionloss[_single(model.joint("carriage").dofadr[0])],
+        motor_friction=model.tendon_frictionloss[_single(model.tendon("motor").id)],
         motor_bias=model.actuator("motor").biasprm,
         tyre=model.pair("tyre").solref,
         tyre_scale=tyre_scale(model),

@@ -1,8 +1,7 @@
-"""How well a test emulates what it should: the ideal system beside the model's output and what was
-sensed.
+"""Tracking errors of a hybrid test: ideal system, model output and sensor readings compared.
 
-e1 = ideal − model output (numerical model error), e2 = model output − sensed (tracking error);
-thesis Eq. 3.1, 3.2.
+e1 = ideal − model output (numerical model error, thesis, eq. 3.1) and e2 = model output − sensed
+(tracking error, thesis, eq. 3.2).
 """
 
 from __future__ import annotations
@@ -22,8 +21,19 @@ from rigtwin.simulation.structure_motion import models_output
 
 @dataclass(frozen=True)
 class Tracking:
-    """rms errors of the structure (position, m) and the suspension (force, N); total is of e1 + e2
-    at every tick."""
+    """rms errors of a test.
+
+    Attributes
+    ----------
+    position_e1, position_e2 : float
+        rms of e1 and e2 of the structure's position, m.
+    position_total : float
+        rms of e1 + e2 of the structure's position, m.
+    force_e1, force_e2 : float
+        rms of e1 and e2 of the suspension's force, N.
+    force_total : float
+        rms of e1 + e2 of the suspension's force, N.
+    """
 
     position_e1: float
     position_e2: float
@@ -36,9 +46,22 @@ class Tracking:
 def compute_tracking(
     target: Ideal, commands: Array, structure: Array, load_cell: Array
 ) -> Tracking:
-    """e1 and e2 of a model-in-the-loop test. target: the ideal system in the same test; commands:
-    what the models asked for, shape (ticks, 3 or more); structure, load_cell: what was sensed, m
-    and N."""
+    """Compute e1 and e2 of a model-in-the-loop test.
+
+    Parameters
+    ----------
+    target
+        Motion of the ideal system in the same test.
+    commands
+        Output of the models, columns of `Commands`, shape (ticks, 3 or more).
+    structure, load_cell
+        Sensed position of the structure, m, and force, N, shape (ticks,).
+
+    Returns
+    -------
+    Tracking
+        rms errors.
+    """
     position, force = commands[:, 1], commands[:, 2]
     return Tracking(
         position_e1=rms(target.structure - position),
@@ -51,7 +74,20 @@ def compute_tracking(
 
 
 def tracking_of(recording: Recording, configuration: Configuration) -> Tracking:
-    """e1 and e2 of a recorded test. What was sensed is without noise where a twin knows it."""
+    """Compute e1 and e2 of a recorded test.
+
+    Parameters
+    ----------
+    recording
+        Recording of a model-in-the-loop test. True values of a twin are used where it has them.
+    configuration
+        Settings of the test.
+
+    Returns
+    -------
+    Tracking
+        rms errors.
+    """
     known = "/truth" in recording.columns
     structure = (
         recording.column("/truth", "structure")

@@ -1,4 +1,4 @@
-"""How near to its limits a test came."""
+"""Peaks of a test in relation to its limits."""
 
 from __future__ import annotations
 
@@ -13,8 +13,17 @@ from rigtwin.simulation.safety import VELOCITY_SPAN
 
 @dataclass(frozen=True)
 class Peak:
-    """One limited quantity of a test. peak and limit in the unit; margin: share of the limit that
-    is left."""
+    """Peak of one limited quantity of a test.
+
+    Attributes
+    ----------
+    name : str
+        Name of the quantity.
+    peak, limit : float
+        Largest magnitude and limit, in the unit.
+    unit : str
+        Unit of both.
+    """
 
     name: str
     peak: float
@@ -23,15 +32,29 @@ class Peak:
 
     @property
     def margin(self) -> float:
+        """Share of the limit that the test did not use; negative beyond the limit."""
         return 1.0 - self.peak / self.limit
 
 
 def peaks(commands: Array, measurements: Array, configuration: Configuration) -> tuple[Peak, ...]:
-    """Every limited quantity of a test. commands, measurements: shape (ticks, 4), columns of
-    controllers.Commands and .Measurements."""
+    """Return the peaks of all limited quantities of a test.
+
+    Parameters
+    ----------
+    commands, measurements
+        Columns of `Commands` and `Measurements`, shape (ticks, 4).
+    configuration
+        Settings of the test, with its limits.
+
+    Returns
+    -------
+    tuple of Peak
+        One peak for each limit.
+    """
     limits, period = configuration.safety, configuration.timing.period
     ground, structure, force, voltage = commands.T
     ground_lvdt, structure_lvdt, travel, load_cell = measurements.T
+    # The same averaging as the limit's own (`safety`), or noise would count as velocity.
     span = min(VELOCITY_SPAN, len(travel) - 1)
     moved = (travel[span:] - travel[:-span]) / (span * period) if span else np.zeros(1)
 

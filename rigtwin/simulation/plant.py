@@ -1,7 +1,8 @@
-"""The running plant.
+"""Running plant of the suspension rig: MuJoCo's mechanics and both cylinders, in compiled code.
 
-MuJoCo's mechanics and both cylinders, advanced from tick to tick by compiled
-code.
+The cylinders prescribe the plates' motion; MuJoCo integrates the carriage between them. What
+depends on the motion (breakaway, cogging, hardening of the tyre) is written into MuJoCo's model
+before each timestep.
 """
 
 from __future__ import annotations
@@ -34,49 +35,39 @@ from rigtwin.simulation.mechanics import Handles, build, handles
 
 
 class Contacts(NamedTuple):
-    """What changes with the motion in the mechanics, and its states.
+    """Forces of the mechanics that change with the motion, and their states."""
 
-    gaps: of the backlashes, shape
-    (1,) each; yielded: of the ground and structure plate under
-    load, m, shape (2,).
-    """
-
-    changing: bool
-    rail: Friction
-    rail_gap: Array
-    motor: Friction
-    motor_gap: Array
-    cogging: float
-    cogging_pitch: float
-    cogging_phase: float
-    stiffness: float
-    damping: float
-    hardening: float
-    hardening_power: float
-    ground_compliance: float
-    ground_unloaded: float
-    ground_lag: float
-    structure_compliance: float
-    structure_unloaded: float
-    structure_lag: float
-    mass: float
-    rail_viscous: float
-    motor_viscous: float
-    gas: GasSpring
-    yielded: Array
+    changing: bool  # Whether anything but constant friction and a linear tyre acts.
+    rail: Friction  # Dry friction of the rail.
+    rail_gap: Array  # State of the rail's backlash, m, shape (1,).
+    motor: Friction  # Dry friction of the motor.
+    motor_gap: Array  # State of the motor's backlash, m, shape (1,).
+    cogging: float  # Amplitude of the motor's cogging, N.
+    cogging_pitch: float  # Wavelength of the cogging, m.
+    cogging_phase: float  # Phase of the cogging at zero travel, rad.
+    stiffness: float  # Stiffness of the tyre at small deflection, N/m.
+    damping: float  # Damping of the tyre, Ns/m.
+    hardening: float  # Hardening of the tyre, 1/m.
+    hardening_power: float  # Power of the hardening.
+    ground_compliance: float  # Compliance of the ground cylinder, m/N.
+    ground_unloaded: float  # Yield of the ground plate without load, m.
+    ground_lag: float  # Lag of the ground plate's yielding, s.
+    structure_compliance: float  # Compliance of the structure cylinder, m/N.
+    structure_unloaded: float  # Yield of the structure plate without load, m.
+    structure_lag: float  # Lag of the structure plate's yielding, s.
+    mass: float  # Mass of the carriage, kg.
+    rail_viscous: float  # Viscous friction of the rail, Ns/m.
+    motor_viscous: float  # Viscous friction of the motor, Ns/m.
+    gas: GasSpring  # Gas spring parallel to the motor.
+    yielded: Array  # Yield of ground and structure plate, m, shape (2,).
 
 
 class PlantState(NamedTuple):
-    """All that compiled code needs to run one plant: its parts and their states.
-
-    `plain` says whether its commands act as they are
-    and its contacts do not change with the
-    motion, as in the nominal rig.
-    """
+    """One plant as compiled code takes it: its parts and their states."""
 
     mechanics: Handles
-    substeps: int
-    plain: bool
+    substeps: int  # Timesteps per tick.
+    plain: bool  # Whether commands act unchanged and contacts are constant, as in the nominal rig.
     ground: CylinderModel
     ground_state: CylinderState
     ground_drive: Actuator
@@ -91,21 +82,21 @@ class PlantState(NamedTuple):
 
 
 def contacts(plant: RigPlant, carriage: float, travel: float, preload: float) -> Contacts:
-    """Gives a plant's contacts before anything moves.
+    """Return a plant's contacts before anything moves.
 
     Parameters
     ----------
-    plant : RigPlant
-        Whose.
-    carriage, travel : float
-        Where they are, m.
-    preload : float
-        What the motor pushes with, N.
+    plant
+        Parameters of the rig.
+    carriage, travel
+        Position of the carriage and travel of the suspension, m.
+    preload
+        Motor force at the start, N.
 
     Returns
     -------
     Contacts
-        With states of their own.
+        Contacts with new states.
     """
     rail, motor, tyre = friction(plant.rail), friction(plant.motor), plant.tyre
     compliances = plant.ground_cylinder.compliance, plant.structure_cylinder.compliance
@@ -139,16 +130,15 @@ def contacts(plant: RigPlant, carriage: float, travel: float, preload: float) ->
 
 
 def initial_deflection(plant: RigPlant, preload: float) -> float:
-    """The tyre's deflection at the start, m.
+    """Return the tyre's deflection at the start, m.
 
-    It carries the motor's preload (N) and the extended
-    gas spring.
+    The tyre carries the motor's preload, N, and the force of the extended gas spring.
     """
     return (preload + plant.gas_spring.force) / plant.tyre.stiffness
 
 
 def initial_yield(plant: RigPlant, preload: float) -> tuple[float, float]:
-    """How far ground and structure plate have yielded at the start, m, under a preload in N."""
+    """Return the yield of ground and structure plate at the start, m, under a preload, N."""
     tyre, unloaded = preload + plant.gas_spring.force, unloaded_yield(plant)
     return (
         unloaded[0] - plant.ground_cylinder.compliance * tyre,
@@ -157,17 +147,29 @@ def initial_yield(plant: RigPlant, preload: float) -> tuple[float, float]:
 
 
 def unloaded_yield(plant: RigPlant) -> tuple[float, float]:
-    """How far ground and structure plate stand from their zero without load, m."""
+    """Return the yield of ground and structure plate without load, m."""
     ground, structure = plant.ground_cylinder, plant.structure_cylinder
     return ground.compliance * ground.zero_load, -structure.compliance * structure.zero_load
 
 
 class Simulation:
-    """One plant at its start.
+    """One plant at its start, with the MuJoCo structures that its `state` views.
 
-    Ground at its first command, spring uncompressed, tyre and motor
-    carrying the preload, all at
-    rest. Owns the MuJoCo structures that `state` looks into.
+    The ground plate is at its first command, the suspension uncompressed. Tyre and motor carry the
+    preload, and everything is at rest.
+
+    Parameters
+    ----------
+    plant
+        Parameters of the rig.
+    timestep
+        Integration step, s.
+    substeps
+        Timesteps per tick.
+    ground, structure
+        Commands of the cylinders at the start, m.
+    preload
+        Motor force at the start, N.
     """
 
     def __init__(
@@ -179,26 +181,23 @@ class Simulation:
         structure: float,
         preload: float,
     ) -> None:
-        """timestep s.
-
-        Ground and structure: commands at the start, m; preload: motor force at the
-        start, N.
-        """
         self.model = build(plant, timestep)
         self.data = mujoco.MjData(self.model)
         view = handles(self.model, self.data)
         drives = [
-            actuator(of, plant.computer, timestep)
-            for of in (plant.ground_cylinder, plant.structure_cylinder, plant.motor)
+            actuator(component, plant.computer, timestep)
+            for component in (plant.ground_cylinder, plant.structure_cylinder, plant.motor)
         ]
         held = [
             hold(drives[0], ground),
             hold(drives[1], structure),
             hold(drives[2], preload / plant.motor.constant),
         ]
-        here = float(held[0].memory[3])
-        view.qpos[view.ground] = here
-        carriage = here + initial_yield(plant, preload)[0] - initial_deflection(plant, preload)
+        ground_position = float(held[0].memory[3])
+        view.qpos[view.ground] = ground_position
+        carriage = (
+            ground_position + initial_yield(plant, preload)[0] - initial_deflection(plant, preload)
+        )
         view.qpos[view.carriage] = view.qpos[view.structure] = carriage
         view.activation[0] = view.control[0] = preload / plant.motor.constant
         touching = contacts(plant, carriage, 0.0, preload)
@@ -207,7 +206,7 @@ class Simulation:
             substeps=substeps,
             plain=not touching.changing and all(each.neutral for each in drives),
             ground=discretise(plant.ground_cylinder, timestep),
-            ground_state=rest_state(plant.ground_cylinder, here),
+            ground_state=rest_state(plant.ground_cylinder, ground_position),
             ground_drive=drives[0],
             ground_command=held[0],
             structure=discretise(plant.structure_cylinder, timestep),
@@ -221,53 +220,55 @@ class Simulation:
 
 
 def continue_motion(before: Simulation, after: Simulation) -> None:
-    """Puts another plant where one stands: positions, velocities, forces and what the cylinders go
-    through.
+    """Give a plant the motion of another: positions, velocities, forces, states of the cylinders.
 
     Parameters
     ----------
-    before : Simulation
-        It stays as it is.
-    after : Simulation
-        Changed in place.
+    before
+        Simulation whose motion is copied.
+    after
+        Simulation that continues it, changed in place.
     """
+    # The solver's warm start belongs to the state: without it the next step differs in its last
+    # digits.
     for name in ("qpos", "qvel", "act", "ctrl", "qacc_warmstart"):
         getattr(after.data, name)[:] = getattr(before.data, name)
-    here, there = before.state, after.state
+    old_state, new_state = before.state, after.state
     for old, new in (
-        (here.ground_state, there.ground_state),
-        (here.structure_state, there.structure_state),
+        (old_state.ground_state, new_state.ground_state),
+        (old_state.structure_state, new_state.structure_state),
     ):
         new.filter[:], new.position[:] = old.filter, old.position
-    there.contacts.yielded[:] = here.contacts.yielded
-    mechanics = there.mechanics
+    new_state.contacts.yielded[:] = old_state.contacts.yielded
+    mechanics = new_state.mechanics
     carriage = mechanics.qpos[mechanics.carriage]
-    there.contacts.rail_gap[:] = gap_at(carriage)
-    there.contacts.motor_gap[:] = gap_at(mechanics.qpos[mechanics.structure] - carriage)
+    new_state.contacts.rail_gap[:] = gap_at(carriage)
+    new_state.contacts.motor_gap[:] = gap_at(mechanics.qpos[mechanics.structure] - carriage)
 
 
 @compilable
-def drive(mechanics: Handles, joint: int, here: float, there: float) -> None:
-    """Prescribes a joint's motion over the coming timestep, from `here` to `there` in m."""
-    mechanics.qpos[joint] = here
-    mechanics.qvel[joint] = (there - here) / mechanics.timestep
+def drive(mechanics: Handles, joint: int, position: float, position_ahead: float) -> None:
+    """Prescribe a joint's motion over the coming timestep, from `position` to the one ahead, m."""
+    mechanics.qpos[joint] = position
+    mechanics.qvel[joint] = (position_ahead - position) / mechanics.timestep
 
 
 @compilable
 def motor_force(mechanics: Handles) -> float:
-    """What the motor pushes with now, its friction apart, N."""
+    """Return the motor's force without its friction, N."""
     return mechanics.motor_constant * mechanics.activation[0] + mechanics.motor_bias[0]
 
 
 @compilable
 def brace(mechanics: Handles) -> None:
-    """Holds the structure plate against the motor, so that its friction is not asked to."""
+    """Hold the structure plate against the motor's force, as its cylinder does."""
+    # Otherwise the motor's dry friction would have to bear a part of that force.
     mechanics.applied[mechanics.structure] = -motor_force(mechanics)
 
 
 @compilable
 def stiffness_ratio(now: Contacts, deflection: float) -> float:
-    """How many times its nominal secant stiffness the tyre has at a deflection, m."""
+    """Return the tyre's secant stiffness at a deflection, m, as a factor on the nominal one."""
     if now.hardening == 0.0 or deflection <= 0.0:
         return 1.0
     return max(
@@ -277,18 +278,15 @@ def stiffness_ratio(now: Contacts, deflection: float) -> float:
 
 @compilable
 def touch(mechanics: Handles, now: Contacts) -> None:
-    """Writes into the mechanics what depends on the motion.
-
-    Dry friction, cogging, the tyre's
-    slope.
-    """
+    """Write dry friction, cogging and tyre stiffness of the current motion into the mechanics."""
     if not now.changing:
         return
     carriage, velocity = mechanics.qpos[mechanics.carriage], mechanics.qvel[mechanics.carriage]
     travel = mechanics.qpos[mechanics.structure] - carriage
     sliding = mechanics.qvel[mechanics.structure] - velocity
     load = mechanics.motor_constant * mechanics.activation[0]
-    # MuJoCo's dry friction is the same both ways; what one way has more is a force besides.
+    # MuJoCo's dry friction is symmetric: the mean of both directions goes there, and half their
+    # difference is an applied force.
     forward, backward = breakaway(now.rail, now.rail_gap, carriage, velocity, load)
     mechanics.rail_friction[0] = 0.5 * (forward + backward)
     mechanics.applied[mechanics.carriage] = 0.5 * (backward - forward)
@@ -306,18 +304,23 @@ def touch(mechanics: Handles, now: Contacts) -> None:
 def give_way(
     mechanics: Handles, now: Contacts, ground: float, structure: float
 ) -> tuple[float, float]:
-    """How far compliant cylinders will have yielded one timestep ahead: ground and structure, m.
+    """Return the yield of ground and structure plate one timestep ahead, m.
 
-    Their loads are worked out here, as MuJoCo takes the plates' motion as given.
+    MuJoCo takes the plates' motion as prescribed, so their loads are predicted here.
 
     Parameters
     ----------
-    mechanics : Handles
-        Whose state is that before the timestep.
-    now : Contacts
-        As they are now; `yielded` is not changed.
-    ground, structure : float
-        The plates' velocities without load, m/s.
+    mechanics
+        State before the timestep.
+    now
+        Contacts before the timestep; `yielded` is not changed.
+    ground, structure
+        Velocities of the plates without load, m/s.
+
+    Returns
+    -------
+    tuple
+        Yield of the ground plate and of the structure plate, m.
     """
     h, v, place = (
         mechanics.timestep,
@@ -340,7 +343,7 @@ def give_way(
     sliding = mechanics.qvel[mechanics.structure] - v
     up, down = breakaway(now.rail, now.rail_gap, place, v, load)
     forward, backward = breakaway(now.motor, now.motor_gap, travel, sliding, load)
-    # What friction has more in one direction stands among the motor's forces already.
+    # The motor's force already contains the difference of friction between both directions.
     load -= 0.5 * (backward - forward)
     push = tyre - (spring_force(now.gas, -travel) if now.gas.force > 0.0 else 0.0)
     free = structure + (now.structure_unloaded - now.yielded[1]) / (now.structure_lag + h)
@@ -361,7 +364,7 @@ def give_way(
 
 @compilable
 def true_measurements(mechanics: Handles) -> Measurements:
-    """What ideal sensors read of the state last computed by `forward` with its sensors."""
+    """Return the readings of ideal sensors after `forward` with sensors."""
     ground, structure = mechanics.qpos[mechanics.ground], mechanics.qpos[mechanics.structure]
     travel = structure - mechanics.qpos[mechanics.carriage]
     return Measurements(ground, structure, travel, mechanics.sensors[mechanics.load_cell])
@@ -369,12 +372,10 @@ def true_measurements(mechanics: Handles) -> Measurements:
 
 @compilable
 def sense(state: PlantState) -> Measurements:
-    """Ideal measurements now, under the commands held until now.
-
-    The plates move over the coming timestep as those commands would move them: a motor that sticks
-    passes on the force that accelerates the carriage with the plate, which a velocity one timestep
-    old would not show.
-    """
+    """Return the readings of ideal sensors now, under the commands held until now."""
+    # The plates move over the coming timestep as those commands would move them. A sticking motor
+    # transmits the force that accelerates the carriage with the plate, which a velocity one
+    # timestep old would not show.
     onward = (
         next_position(state.ground, state.ground_state, state.ground_command.memory[3]),
         next_position(state.structure, state.structure_state, state.structure_command.memory[3]),
@@ -386,30 +387,32 @@ def sense(state: PlantState) -> Measurements:
 
 @compilable
 def move_plates(
-    state: PlantState, here: tuple[float, float], there: tuple[float, float]
+    state: PlantState, plates: tuple[float, float], plates_ahead: tuple[float, float]
 ) -> tuple[float, float]:
-    """Prescribes the plates' motion over the coming timestep, ground and structure, m.
+    """Prescribe the motion of both plates over the coming timestep.
 
     Parameters
     ----------
-    state : PlantState
-        Whose mechanics are written into.
-    here, there : tuple
-        Where the cylinders hold them without load, now and one timestep ahead.
+    state
+        Plant whose mechanics are written.
+    plates, plates_ahead
+        Unloaded positions of ground and structure plate now and one timestep ahead, m.
 
     Returns
     -------
     tuple
-        How far they will have yielded then.
+        Yield of both plates one timestep ahead, m.
     """
     mechanics, now = state.mechanics, state.contacts
     ahead = (0.0, 0.0)
     if now.ground_compliance > 0.0 or now.structure_compliance > 0.0:
         h = mechanics.timestep
         touch(mechanics, now)
-        ahead = give_way(mechanics, now, (there[0] - here[0]) / h, (there[1] - here[1]) / h)
-    drive(mechanics, mechanics.ground, here[0] + now.yielded[0], there[0] + ahead[0])
-    drive(mechanics, mechanics.structure, here[1] + now.yielded[1], there[1] + ahead[1])
+        ahead = give_way(
+            mechanics, now, (plates_ahead[0] - plates[0]) / h, (plates_ahead[1] - plates[1]) / h
+        )
+    drive(mechanics, mechanics.ground, plates[0] + now.yielded[0], plates_ahead[0] + ahead[0])
+    drive(mechanics, mechanics.structure, plates[1] + now.yielded[1], plates_ahead[1] + ahead[1])
     touch(mechanics, now)
     brace(mechanics)
     return ahead
@@ -419,7 +422,8 @@ def move_plates(
 def advance(
     state: PlantState, ground_command: float, structure_command: float, voltage: float
 ) -> None:
-    """One control period with the commands held."""
+    """Advance the plant by one tick with its commands held: cylinders, m, and motor voltage, V."""
+    # The nominal rig needs none of the effects' code.
     if state.plain:
         advance_plain(
             mechanics=state.mechanics,
@@ -437,14 +441,14 @@ def advance(
         return
     mechanics, now = state.mechanics, state.contacts
     for _ in range(state.substeps):
-        here = state.ground_state.position[0], state.structure_state.position[0]
+        plates = state.ground_state.position[0], state.structure_state.position[0]
         asked = condition(state.ground_drive, state.ground_command, ground_command)
         advance_cylinder(state.ground, state.ground_state, asked)
         asked = condition(state.structure_drive, state.structure_command, structure_command)
         advance_cylinder(state.structure, state.structure_state, asked)
         mechanics.control[0] = condition(state.motor_drive, state.motor_command, voltage)
-        there = state.ground_state.position[0], state.structure_state.position[0]
-        now.yielded[0], now.yielded[1] = move_plates(state, here, there)
+        plates_ahead = state.ground_state.position[0], state.structure_state.position[0]
+        now.yielded[0], now.yielded[1] = move_plates(state, plates, plates_ahead)
         forward(mechanics.model, mechanics.data, 0, 1)
         integrate(mechanics.model, mechanics.data)
 
@@ -461,9 +465,9 @@ def advance_plain(
     structure_command: float,
     voltage: float,
 ) -> None:
-    """The same for a plant whose commands act as they are and whose contacts do not change.
+    """Advance a plant whose commands act unchanged and whose contacts are constant.
 
-    A third faster.
+    The result is that of the general way in `advance`, about a third faster.
     """
     mechanics.control[0] = voltage
     for _ in range(substeps):

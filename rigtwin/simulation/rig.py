@@ -1,4 +1,4 @@
-"""What every rig can do, be it the twin or the real one behind a DAQ."""
+"""Protocols of a rig, implemented by the twin, a replay and the real rig behind its card."""
 
 from __future__ import annotations
 
@@ -8,15 +8,17 @@ from controllers import Commands, Measurements
 
 
 class Rig(Protocol):
-    """Four verbs. The loop calls `start`, then `read` and `write` once a tick, then `stop`, also
-    after a fault."""
+    """Protocol of a rig that runs a test.
+
+    The loop calls `start`, then `read` and `write` once per tick, then `stop`, also after a fault.
+    """
 
     def start(self) -> None:
-        """Makes the rig ready at its start position."""
+        """Make the rig ready at its start position."""
         ...
 
     def read(self) -> Measurements:
-        """Samples all sensors; waits for the next tick if the rig has a clock."""
+        """Sample all sensors, after waiting for the next tick if the rig has a clock."""
         ...
 
     def write(self, commands: Commands) -> None:
@@ -24,25 +26,25 @@ class Rig(Protocol):
         ...
 
     def stop(self) -> None:
-        """Brings the rig to rest."""
+        """Bring the rig to rest."""
         ...
 
 
 class DrivenRig(Protocol):
-    """A machine that is led into a test and out of it, as a real one must be: its actuators also
-    have power, and it may be late. Samples and commands are those of its `Signals`.
+    """Protocol of a machine that is led into a test and out of it, as a real one must be.
 
-    missed: ticks that passed unread before the last `read`.
+    Its actuators have a power supply, and it may miss ticks. Samples and commands are those of its
+    `Signals`.
     """
 
-    missed: int
+    missed: int  # Ticks that passed unread before the last `read`.
 
     def start(self) -> None:
-        """Makes it ready; nothing moves."""
+        """Make the machine ready without moving it."""
         ...
 
     def read(self) -> tuple[float, ...]:
-        """Samples all sensors; waits for the next tick if it has a clock."""
+        """Sample all sensors, after waiting for the next tick if the machine has a clock."""
         ...
 
     def write(self, commands: Any) -> None:
@@ -50,9 +52,9 @@ class DrivenRig(Protocol):
         ...
 
     def power(self, on: bool) -> None:
-        """Lets the actuators have power, such as hydraulics their pressure, or takes it off."""
+        """Switch the actuators' power on or off, such as the pressure of hydraulics."""
         ...
 
     def stop(self) -> None:
-        """Forces to zero, power off."""
+        """Set forces to zero and switch the power off."""
         ...

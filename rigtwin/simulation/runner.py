@@ -1,4 +1,4 @@
-"""Runs one test on the twin, into a recording or in memory."""
+"""Test on the twin of the suspension rig, into a recording or in memory."""
 
 from __future__ import annotations
 
@@ -18,19 +18,29 @@ from rigtwin.description.machine import OWN
 from rigtwin.description.settings import Safety
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Writer
-from rigtwin.simulation.loop import BLOCK, Tick, run, run_compiled
+from rigtwin.simulation.loop import BLOCK, Block, Tick, run, run_compiled
 from rigtwin.simulation.safety import Trip, explain_trip
 from rigtwin.simulation.twin import Twin
 
 AT_ONCE = 10 * BLOCK
-"""Ticks of a twin's test that compiled code does at once: to be called costs it as much as a
-hundred ticks."""
+"""Ticks that compiled code runs in one call. A call costs as much as a hundred ticks."""
 
 
 @dataclass(frozen=True)
 class RunResult:
-    """How a test went. ticks: recorded; reason: one line; tripped: whether a limit ended it
-    early."""
+    """Result of a recorded test.
+
+    Attributes
+    ----------
+    path : Path
+        File of the recording.
+    ticks : int
+        Number of recorded ticks.
+    reason : str
+        Why the test ended, in one line.
+    tripped : bool
+        Whether a limit ended the test early.
+    """
 
     path: Path
     ticks: int
@@ -40,8 +50,16 @@ class RunResult:
 
 @dataclass(frozen=True)
 class SimulationResult:
-    """A test run in memory. commands, measurements, truth: shape (ticks, 4), columns of
-    controllers.Commands, .Measurements; trip: why it ended early, or Trip.NONE."""
+    """Result of a test that was run in memory.
+
+    Attributes
+    ----------
+    commands, measurements, truth : Array
+        Commands, readings with noise and readings of ideal sensors, columns of `Commands` and
+        `Measurements`, shape (ticks, 4).
+    trip : Trip
+        Limit that ended the test early, or Trip.NONE.
+    """
 
     commands: Array
     measurements: Array
@@ -50,21 +68,21 @@ class SimulationResult:
 
 
 def simulate(configuration: Configuration, demands: Array, seed: int) -> SimulationResult:
-    """Runs a test on the twin and keeps everything in memory.
+    """Run a test on the twin in memory.
 
     Parameters
     ----------
     configuration
-        Of the test.
+        Settings of the test.
     demands
-        Columns of controllers.Demand, shape (ticks, 3).
+        Columns of `controllers.Demand`, shape (ticks, 3).
     seed
-        Of the sensors' noise.
+        Seed of the sensors' noise.
 
     Returns
     -------
     SimulationResult
-        Commands, measurements and truth at every tick, and why it ended.
+        Commands, measurements and truth at every tick, and the limit that tripped.
     """
     blocks = list(
         run_compiled(Twin(configuration, float(demands[0, 0]), seed), configuration, demands)
@@ -78,19 +96,19 @@ def simulate(configuration: Configuration, demands: Array, seed: int) -> Simulat
 
 
 def without_limits(configuration: Configuration) -> Configuration:
-    """The same without trips, to see what a twin would do wherever it goes.
-
-    Parameters
-    ----------
-    configuration
-        Of a test.
-
-    Returns
-    -------
-    Configuration
-        With infinite limits.
-    """
+    """Return a configuration with infinite limits, under which no test trips."""
     return configuration._replace(safety=Safety(*(math.inf for _ in Safety._fields)))
+
+
+def _append_block(writer: Writer, block: Block) -> None:
+    """Append the ticks of a block to a recording, a quarter of a second at a time."""
+    for first in range(0, len(block.commands), BLOCK):
+        part = slice(first, first + BLOCK)
+        writer.append(
+            command=block.commands[part],
+            sensor=block.measurements[part],
+            truth=None if block.truth is None else block.truth[part],
+        )
 
 
 def record(
@@ -107,70 +125,69 @@ def record(
     controller: Tick | None = None,
     description: Path | None = None,
 ) -> RunResult:
-    """Runs a test on the twin of a quarter car into a new recording.
+    """Run a test on the twin of a quarter car into a new recording.
 
     A trip, an interruption or an exception leaves a readable recording that says why it ended.
 
     Parameters
     ----------
     path
-        Of the recording.
+        File of the recording.
     experiment
-        The test's name.
+        Name of the test.
     configuration
-        What the operator knows.
+        Settings as the operator knows them; they are stored in the recording.
     demands
-        Columns of controllers.Demand, shape (ticks, 3).
+        Columns of `controllers.Demand`, shape (ticks, 3).
     seed
-        Of the sensors' noise.
+        Seed of the sensors' noise.
     progress
-        Called with the ticks done since its last call.
+        Function that is called with the number of ticks since its last call.
     effects
-        As `--effect` takes them; the rig has them, the operator's settings do not know of them.
+        Hidden effects: simulated, but not stored in the recording's settings.
     effects_from
-        s, from when on it has them, rounded up to a block of the recording.
+        Time from which the effects act, s, rounded up to a block of the recording.
     machine
-        The machine's name.
+        Name of the machine.
     controller
-        One of one's own instead of the rig's, tick by tick in Python; the recording then says
-        nothing of a controller's settings but where the test started.
+        Controller of the user, tick by tick in Python. Default: the rig's own. With it, the
+        recording stores only the start and the preload of the controller's settings.
     description
-        Description of the machine, which the recording remembers; None for a shipped one.
+        Description of the machine, stored in the recording; None for a shipped one.
 
     Returns
     -------
     RunResult
-        How it went.
+        Path, number of ticks and reason of the end.
 
     Raises
     ------
     RigtwinError
-        Before anything is written, if the configuration is at fault.
+        If the configuration is invalid. Nothing is written then.
     """
     actual = apply_effects(configuration, list(effects))
     later = effects_from > 0.0
     twin = Twin(configuration if later else actual, float(demands[0, 0]), seed)
     if controller is None:
-        # Refused before the recording takes the place of another.
+        # A refused test must not replace an existing recording, so check before writing.
         set_up(actual.controller, actual.timing.period)
     settings = flatten(configuration)
-    told: dict[str, object] = dict(settings["controller"])
+    controller_settings: dict[str, object] = dict(settings["controller"])
     blocks = run_compiled(twin, actual, demands, BLOCK if later else AT_ONCE)
     if controller is not None:
-        told = {OWN: True, **{name: told[name] for name in ("start", "preload")}}
+        controller_settings = {
+            OWN: True,
+            **{name: controller_settings[name] for name in ("start", "preload")},
+        }
         blocks = run(twin, actual, demands, controller)
     ticks, trip, column = 0, Trip.NONE, 0
     period = configuration.timing.period
-    with Writer(path, experiment, period, told, machine, description=description) as writer:
+    with Writer(
+        path, experiment, period, controller_settings, machine, description=description
+    ) as writer:
         writer.add_twin(seed, settings, tuple(effects), __version__, effects_from)
         for block in blocks:
-            for first in range(0, len(block.commands), BLOCK):
-                part = slice(first, first + BLOCK)
-                writer.append(
-                    command=block.commands[part],
-                    sensor=block.measurements[part],
-                    truth=None if block.truth is None else block.truth[part],
-                )
+            _append_block(writer, block)
             ticks, trip, column = ticks + len(block.commands), block.trip, block.column
             if later and ticks * configuration.timing.period >= effects_from - 1e-9:
                 twin.change(actual)

@@ -1,9 +1,7 @@
-"""Limits: what ends a test at once.
+"""Limits that end a test at once, on raw measurements and on commands before they are written.
 
-Looks at raw measurements and at commands before they are written, on twin and rig alike.
-
-A plain function of (limits, what was seen before, what is seen now), so that the twin's compiled
-loop and the rig's loop call the same one.
+The judgement is a plain function of the limits, the earlier ticks and the current tick, so that the
+twin's compiled loop and the rig's loop call the same one.
 """
 
 from __future__ import annotations
@@ -22,16 +20,16 @@ from rigtwin.description.settings import Safety
 from rigtwin.numerics.arrays import Array
 
 MOTOR_LAG = RigPlant().motor.time_constant
-"""s, of the motor's force behind its voltage."""
+"""Time constant of the motor's force behind its voltage, s."""
 LEADING = 1.5
-"""Times its cylinder's limit that a command may be."""
+"""Largest command of a cylinder, as a multiple of its position limit."""
 VELOCITY_SPAN = 10
-"""Ticks over which a velocity is averaged before it is held against its limit: noise of single
-samples is no motion."""
+"""Ticks over which a velocity is averaged before it is compared with its limit, so that noise of
+single samples does not count as motion."""
 
 
 class Trip(IntEnum):
-    """Why a test ended early."""
+    """Limit that ended a test early."""
 
     NONE = 0
     STRUCTURE = 1
@@ -65,26 +63,26 @@ class Trip(IntEnum):
     _WHEEL,
     _MOTOR,
 ) = (trip.value for trip in Trip)
-"""Plain numbers: looking up an enumeration's value takes longer than the comparison."""
+"""Values of the trips. Looking up an enumeration's value takes longer than the comparison."""
 
 
 class LimitMemory(NamedTuple):
-    """What the limits remember of earlier ticks; changed in place.
+    """Memory of the limits over earlier ticks; changed in place.
 
-    Arrays for compiled loops; lists, which Python reads faster, for others.
+    It consists of arrays for compiled loops, and of lists, which Python reads faster, for others.
 
     Parameters
     ----------
     measured
-        Last measurements, shape (4,), not a number before the first tick.
+        Last measurements, shape (4,); NaN before the first tick.
     repeats
-        Readings in a row that were the same, shape (4,).
+        Number of equal readings in a row, shape (4,).
     commands
         Last commands, shape (4,).
     travel
-        A ring of VELOCITY_SPAN samples and its place, shape (VELOCITY_SPAN + 1,), m.
+        Ring buffer of VELOCITY_SPAN samples, m, and its position, shape (VELOCITY_SPAN + 1,).
     motor
-        Force that the voltage must have made by now, shape (1,), N.
+        Motor force expected from the voltage, N, shape (1,).
     """
 
     measured: Array | list[float]
@@ -95,7 +93,8 @@ class LimitMemory(NamedTuple):
 
 
 def empty_memory() -> LimitMemory:
-    """Before the first tick, for a loop in Python."""
+    """Return the memory before the first tick, for a loop in Python."""
+    # Comparisons with NaN are false, so nothing trips for want of an earlier tick.
     unknown = [math.nan]
     return LimitMemory(
         4 * unknown, [1.0] * 4, 4 * unknown, (VELOCITY_SPAN + 1) * unknown, 1 * unknown
@@ -103,7 +102,7 @@ def empty_memory() -> LimitMemory:
 
 
 def empty_memory_arrays() -> LimitMemory:
-    """Before the first tick, for a compiled loop."""
+    """Return the memory before the first tick, for a compiled loop."""
     return LimitMemory(*(np.array(values) for values in empty_memory()))
 
 
@@ -111,27 +110,28 @@ def empty_memory_arrays() -> LimitMemory:
 def judge_measurements(
     limits: Safety, period: float, memory: LimitMemory, measured: Measurements
 ) -> tuple[int, int]:
-    """Finds the first limit that the measurements of this tick violate.
+    """Find the first limit that the measurements of this tick violate.
 
     Parameters
     ----------
-    limits : Safety
-        Of the test.
-    period : float
-        s since the tick before.
-    memory : LimitMemory
-        Of the ticks before; changed in place.
-    measured : Measurements
-        Of this tick.
+    limits
+        Limits of the test.
+    period
+        Time since the last tick, s.
+    memory
+        Memory of earlier ticks; changed in place.
+    measured
+        Measurements of this tick.
 
     Returns
     -------
     tuple of int
-        A Trip's number and the column, of Measurements or, from 4 on, of Commands.
+        Number of a Trip, and the column, of `Measurements` or from 4 on of `Commands`.
     """
     for column in range(4):
         if not math.isfinite(measured[column]):
             return _NOT_A_NUMBER, column
+    # The memory of all channels must advance even after a trip: find first, return later.
     trip, at = _NONE, 0
     for column in range(4):
         change = abs(measured[column] - memory.measured[column])
@@ -158,8 +158,8 @@ def judge_measurements(
         return _GROUND, 0
     if moved > limits.velocity * VELOCITY_SPAN * period:
         return _VELOCITY, 2
-    # What two sensors or a command say of the same thing: the wheel stands on the ground plate,
-    # the motor pushes as told.
+    # Redundancy: the three LVDTs must agree on a wheel that stands on the ground plate, and the
+    # load cell must agree with the motor's voltage.
     if (
         abs(measured.structure_lvdt - measured.suspension_lvdt - measured.ground_lvdt)
         > limits.wheel
@@ -174,34 +174,34 @@ def judge_measurements(
 def judge_commands(
     limits: Safety, period: float, memory: LimitMemory, measured: Measurements, commands: Commands
 ) -> tuple[int, int]:
-    """Finds the first limit that the commands of this tick violate.
+    """Find the first limit that the commands of this tick violate.
 
     Commands that pass are remembered as written.
 
     Parameters
     ----------
-    limits : Safety
-        Of the test.
-    period : float
-        s since the tick before.
-    memory : LimitMemory
-        Of the ticks before; changed in place.
-    measured : Measurements
-        Of this tick.
-    commands : Commands
-        Before they are written.
+    limits
+        Limits of the test.
+    period
+        Time since the last tick, s.
+    memory
+        Memory of earlier ticks; changed in place.
+    measured
+        Measurements of this tick.
+    commands
+        Commands of this tick, before they are written.
 
     Returns
     -------
     tuple of int
-        A Trip's number and the column, of Measurements or, from 4 on, of Commands.
+        Number of a Trip, and the column, of `Measurements` or from 4 on of `Commands`.
     """
     for column in range(4):
         if not math.isfinite(commands[column]):
             return _NOT_A_NUMBER, 4 + column
+    # A command may exceed the position limit for as long as the cylinder lags behind it.
     if abs(commands.ground) > LEADING * limits.ground:
         return _COMMAND, 4
-    # What leads a cylinder to its limit may be beyond it for as long as the cylinder lags behind.
     if abs(commands.structure) > LEADING * limits.structure:
         return _COMMAND, 5
     for column in (0, 1, 3):
@@ -216,6 +216,7 @@ def judge_commands(
         return _FOLLOWING, 3
     for column in range(4):
         memory.commands[column] = commands[column]
+    # Expected motor force: the voltage through the amplifier's first-order lag.
     share = 1.0 - math.exp(-period / MOTOR_LAG)
     force = memory.motor[0] if math.isfinite(memory.motor[0]) else measured.load_cell
     memory.motor[0] = force + share * (MOTOR_CONSTANT * commands.voltage - force)
@@ -226,23 +227,23 @@ def judge_commands(
 def judge_limits(
     limits: Safety, period: float, memory: LimitMemory, measured: Measurements, commands: Commands
 ) -> tuple[int, int]:
-    """Judges one tick.
+    """Find the first limit that a tick violates.
 
     Parameters
     ----------
-    limits : Safety
-        Of the test.
-    period : float
-        s since the tick before.
-    memory : LimitMemory
-        What was seen before; changed in place.
+    limits
+        Limits of the test.
+    period
+        Time since the last tick, s.
+    memory
+        Memory of earlier ticks; changed in place.
     measured, commands
-        Of this tick; commands before they are written.
+        Measurements of this tick, and its commands before they are written.
 
     Returns
     -------
     tuple of int
-        A Trip's number and the column, of Measurements or, from 4 on, of Commands.
+        Number of a Trip, and the column, of `Measurements` or from 4 on of `Commands`.
     """
     trip, column = judge_measurements(limits, period, memory, measured)
     if trip == _NONE:
@@ -251,17 +252,15 @@ def judge_limits(
 
 
 def stop_state(limits: Safety, commands: Commands) -> Commands:
-    """The stop state after commands.
-
-    No force, cylinders where they were told to be, but not beyond their limits.
-    """
+    """Return the stop state: no force, and the cylinders at their commands, within their limits."""
     ground = min(max(commands.ground, -limits.ground), limits.ground)
     structure = min(max(commands.structure, -limits.structure), limits.structure)
     return Commands(ground, structure, 0.0, 0.0)
 
 
 def is_beyond(limits: Safety, measured: Measurements) -> bool:
-    """Whether a cylinder is beyond its limit, or cannot be seen to be within."""
+    """Return whether a cylinder is beyond its limit, or its position is unknown."""
+    # Compared this way round, a NaN counts as beyond.
     ground, structure = (
         abs(measured.ground_lvdt) <= limits.ground,
         abs(measured.structure_lvdt) <= limits.structure,
@@ -270,21 +269,21 @@ def is_beyond(limits: Safety, measured: Measurements) -> bool:
 
 
 def find_arming_obstacle(limits: Safety, measured: Measurements) -> str | None:
-    """Finds why the rig may not be armed as it stands.
+    """Find the reason why the rig may not be armed in its present state.
 
-    After a trip everything must be back inside its limit by the hysteresis.
+    After a trip, all quantities must be back within their limits by the hysteresis.
 
     Parameters
     ----------
-    limits : Safety
-        Of the test.
-    measured : Measurements
-        As it stands.
+    limits
+        Limits of the test.
+    measured
+        Present measurements.
 
     Returns
     -------
     str or None
-        The reason; None if it may be armed.
+        Reason, or None if the rig may be armed.
     """
     share = 1.0 - limits.hysteresis
     for name, limit in zip(
@@ -302,21 +301,21 @@ def find_arming_obstacle(limits: Safety, measured: Measurements) -> str | None:
 
 
 def explain_trip(trip: Trip, limits: Safety, column: int = 0) -> str:
-    """Explains a trip in one line for the operator.
+    """Explain a trip in one line for the operator.
 
     Parameters
     ----------
-    trip : Trip
-        What ended the test.
-    limits : Safety
-        Of the test.
-    column : int
-        Of Measurements, from 4 on of Commands.
+    trip
+        Limit that ended the test.
+    limits
+        Limits of the test.
+    column
+        Column of `Measurements`, or from 4 on of `Commands`.
 
     Returns
     -------
     str
-        With limit and unit.
+        Explanation with limit and unit.
     """
     name = (*Measurements._fields, *(f"command of {field}" for field in Commands._fields))[column]
     lvdt, rate = ("m", limits.lvdt_rate) if column != 3 else ("N", limits.force_rate)

@@ -1,10 +1,10 @@
-"""A model that takes longer than a tick, between whose targets the plate moves on: predicted while
-the next target is awaited, corrected towards it once it is there.
+"""Structure model that needs more than a tick for each target of the plate.
 
-Predictor and corrector are polynomials of second order through the last targets, as in event-driven
-hybrid tests (Mosqueda, Stojadinovic and Mahin, Earthquake Engineering and Structural Dynamics 34
-(2005) 1443). What is late holds the plate where it is, and is counted; what stays late ends the
-test.
+Between targets the plate moves on: predicted while the next target is awaited, corrected towards it
+once it has arrived. Predictor and corrector are parabolas through the last targets, as in
+event-driven hybrid tests (Mosqueda, Stojadinovic and Mahin, Earthquake Engineering and Structural
+Dynamics 34 (2005) 1443). While a target is late, the plate is held and the ticks are counted. A
+target that stays late ends the test.
 """
 
 from __future__ import annotations
@@ -15,28 +15,28 @@ import threading
 from rigtwin.errors import RigtwinError
 
 LATEST = 0.5
-"""s that a target may be late before the test is ended."""
+"""Largest delay of a target before the test ends, s."""
 
 
 class LateModel(RigtwinError):
-    """A model that gave no target for too long."""
+    """Error of a model that gave no target for too long."""
 
 
 class SlowModel:
-    """A structure whose positions come from elsewhere, one every `ticks` ticks.
+    """Structure whose positions come from another program, one every `ticks` ticks.
 
     Thread-safe: one thread moves the plate by `advance`, another gives targets and takes forces.
 
     Parameters
     ----------
     start
-        m, of the plate.
+        Position of the plate at the start, m.
     ticks
-        From one target to the next.
+        Ticks from one target to the next.
     waits
-        Whether a tick waits for its target: a twin has time, a rig has not.
+        Whether a tick waits for its target. A twin can wait; a real rig cannot.
     latest
-        s that a target may be late, in all of a wait.
+        Largest delay of a target, s.
     """
 
     def __init__(
@@ -51,7 +51,7 @@ class SlowModel:
                 least = "" if low < 0.0 else f" from {low:g}"
                 raise RigtwinError(f"{name} = {value!r:.40}: expected a finite number{least}")
         self.late = 0
-        """Ticks that the plate was held because there was no target."""
+        """Number of ticks at which the plate was held for want of a target."""
         self._targets = [start, start, start]
         self._next: float | None = None
         self._felt: float | None = None
@@ -64,7 +64,21 @@ class SlowModel:
     # The fast side
 
     def advance(self, force: float, period: float) -> float:
-        """Where the plate is at the next tick. Raises LateModel."""
+        """Return the plate's position at the next tick, m.
+
+        Parameters
+        ----------
+        force
+            Measured force at this tick, N.
+        period
+            Time from tick to tick, s.
+
+        Raises
+        ------
+        LateModel
+            If a target is late by more than `latest`.
+        """
+        # One lock for targets and forces: both threads see a consistent pair.
         with self._changed:
             self._felt = force
             self._changed.notify_all()
@@ -96,13 +110,13 @@ class SlowModel:
         assert self._next is not None
         way = [*self._targets[1:], self._next]
         if not self._begun:
-            # One that comes late is made for in a quarter of the ticks.
+            # A late target is approached within a quarter of the ticks, without a jump.
             self._done = min(self._done, self._ticks - max(1, self._ticks // 4))
             self._from, self._begun = self._done, True
             self._off = self._position - _through(way, self._done / self._ticks)
         self._done += 1
-        left = (self._ticks - self._done) / max(self._ticks - self._from, 1)
-        self._position = _through(way, self._done / self._ticks) + self._off * left
+        remaining = (self._ticks - self._done) / max(self._ticks - self._from, 1)
+        self._position = _through(way, self._done / self._ticks) + self._off * remaining
         if self._done < self._ticks:
             return
         self._targets, self._next = way, None
@@ -113,7 +127,7 @@ class SlowModel:
     # The slow side
 
     def give(self, target: float) -> bool:
-        """Gives the next target, m, once the one before is reached; False if the test is over."""
+        """Give the next target, m, once the last is reached; return False if the test ended."""
         with self._changed:
             self._changed.wait_for(lambda: self._next is None or self._over)
             if self._over:
@@ -123,7 +137,7 @@ class SlowModel:
             return True
 
     def take_force(self) -> float | None:
-        """The force at the last target, N, once it is reached; None if the test is over."""
+        """Return the force at the last target, N, once it is reached; None if the test ended."""
         with self._changed:
             self._changed.wait_for(
                 lambda: (self._next is None and self._felt is not None) or self._over
@@ -131,13 +145,16 @@ class SlowModel:
             return None if self._over else self._felt
 
     def end(self) -> None:
-        """No more targets come, or none are wanted: the plate stays where it is."""
+        """End the exchange of targets and forces; the plate stays where it is."""
+        # Both threads may be waiting for the other: wake them.
         with self._changed:
             self._over = True
             self._changed.notify_all()
 
 
 def _through(points: list[float], place: float) -> float:
-    """Of a parabola through three points at −1, 0 and 1."""
-    before, here, ahead = points
-    return here + 0.5 * place * (ahead - before) + 0.5 * place**2 * (ahead - 2.0 * here + before)
+    """Return the value at a place of the parabola through three points at −1, 0 and 1."""
+    before, middle, ahead = points
+    return (
+        middle + 0.5 * place * (ahead - before) + 0.5 * place**2 * (ahead - 2.0 * middle + before)
+    )

@@ -1,4 +1,4 @@
-"""What the structure model did during a test: the controller run again on what was measured."""
+"""Motion of the structure model during a test: the controller is run again on the measurements."""
 
 from __future__ import annotations
 
@@ -52,13 +52,25 @@ def _states(
 
 
 def states(settings: Settings, period: float, measured: Array, demands: Array) -> Array:
-    """The controller's packed state after every tick, shape (ticks, SIZE).
+    """Return the controller's packed state after every tick.
 
-    measured: shape (ticks,
-    4), columns of controllers.Measurements; demands: shape (ticks, 3), of
-    controllers.Demand;
-    period: s.
+    Parameters
+    ----------
+    settings
+        Settings of the controller.
+    period
+        Time from tick to tick, s.
+    measured
+        Columns of `controllers.Measurements`, shape (ticks, 4).
+    demands
+        Columns of `controllers.Demand`, shape (ticks, 3).
+
+    Returns
+    -------
+    array
+        Packed states, shape (ticks, SIZE).
     """
+    # The controller is deterministic, so the recorded inputs reproduce its states.
     controlling = set_up(settings, period)
     out = np.empty((len(measured), SIZE))
     start = initial_state(controlling)
@@ -74,11 +86,21 @@ def states(settings: Settings, period: float, measured: Array, demands: Array) -
 
 
 def models_output(configuration: Configuration, commands: Array, measured: Array) -> Array:
-    """What the models of a test asked for, shape (ticks, 4), columns of controllers.Commands: its
-    commands, but for the plate's before a compensator of its delay.
+    """Return the output of a test's models: its commands, before any delay compensator.
 
-    commands: those of the test; measured: what its controller read, columns of
-    controllers.Measurements.
+    Parameters
+    ----------
+    configuration
+        Settings of the test.
+    commands
+        Commands of the test, columns of `controllers.Commands`, shape (ticks, 4).
+    measured
+        Readings of the controller, columns of `controllers.Measurements`, shape (ticks, 4).
+
+    Returns
+    -------
+    array
+        Columns of `controllers.Commands`, shape (ticks, 4).
     """
     settings = configuration.controller
     if settings.plate_compensator == PlateCompensator.NONE or settings.mode == Mode.IMPOSED:
@@ -90,17 +112,16 @@ def models_output(configuration: Configuration, commands: Array, measured: Array
 
 
 def wing(settings: Settings, period: float, packed_states: Array) -> Array:
-    """Of the cross of beams.
+    """Return the height of the cross of beams over its centre, m, shape (ticks, 4).
 
-    Height over its centre at 0, 1, 2 and 3 beams from it, m, shape
-    (ticks, 4).
+    The columns are 0, 1, 2 and 3 beams away from the centre.
     """
     heights = packed_states[:, PLACES["modal"]] @ set_up(settings, period).modes.wing
     return heights - heights[:, :1]
 
 
 def recorded_wing(recording: Recording) -> Array | None:
-    """The same of a recording, or None if its structure model was not of beams."""
+    """Return `wing` of a recording, or None if its structure model was not a cross of beams."""
     settings = override(Configuration(), {"controller": recording.controller}).controller
     if settings.structure != Structure.BEAM:
         return None

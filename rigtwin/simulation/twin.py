@@ -1,4 +1,4 @@
-"""The twin as a rig: MuJoCo's mechanics, both cylinders, and the converters in between."""
+"""Twin of the suspension rig as a `Rig`: mechanics in MuJoCo, both cylinders and converters."""
 
 from __future__ import annotations
 
@@ -24,20 +24,27 @@ def _sense(plant: PlantState, out: Array) -> None:
 
 
 class Twin:
-    """A simulated rig.
+    """Simulated rig.
 
-    The same configuration, first ground command and seed give the same
-    measurements to the bit.
+    The same configuration, first ground command and seed give the same measurements to the bit.
+    `truth` holds the last readings of ideal sensors.
 
-    `truth` holds the last measurements before noise and quantisation.
+    Parameters
+    ----------
+    configuration
+        Settings of the test.
+    ground
+        First ground command, m.
+    seed
+        Seed of the sensors' noise and of missed ticks.
+
+    Raises
+    ------
+    RigtwinError
+        If the period is not a multiple of the timestep.
     """
 
     def __init__(self, configuration: Configuration, ground: float, seed: int) -> None:
-        """ground: the first ground command, m.
-
-        Raises RigtwinError unless the period is a multiple
-        of the timestep.
-        """
         controller = configuration.controller
         self.simulation = Simulation(
             configuration.plant,
@@ -49,6 +56,7 @@ class Twin:
         )
         self.disturbance = Disturbance(configuration.plant, configuration.timing.period, seed)
         self.sensing = build_sensing(configuration.plant, configuration.timing.period)
+        # A stream of its own: missed ticks do not change the noise.
         self._missed = np.random.default_rng([seed, 2])
         self._share_missed = configuration.plant.computer.missed_ticks
         self.held = Commands(
@@ -57,8 +65,11 @@ class Twin:
         self.truth = Measurements(0.0, 0.0, 0.0, 0.0)
 
     def change(self, configuration: Configuration) -> None:
-        """Goes on as another plant, from where it stands: its motion, and the noise that was drawn,
-        stay; what acts on commands begins as if the present ones had been held for long."""
+        """Continue the test with another plant.
+
+        The motion and the streams of noise continue. The conditioning of commands begins as if the
+        present ones had been held for long.
+        """
         plant, before = configuration.plant, self.simulation
         self.simulation = Simulation(
             plant,
@@ -70,8 +81,8 @@ class Twin:
         )
         continue_motion(before, self.simulation)
         sensing = build_sensing(plant, configuration.timing.period)
-        for here, there in zip(self.sensing.states, sensing.states, strict=True):
-            for old, new in zip(here, there, strict=True):
+        for old_state, new_state in zip(self.sensing.states, sensing.states, strict=True):
+            for old, new in zip(old_state, new_state, strict=True):
                 if old.shape == new.shape:
                     new[:] = old
         self.sensing = sensing
@@ -79,7 +90,7 @@ class Twin:
         self._share_missed = plant.computer.missed_ticks
 
     def start(self) -> None:
-        """Nothing to do: a twin is built at its start."""
+        """Do nothing: a twin is built at its start."""
 
     def read(self) -> Measurements:
         true = np.empty(4)
@@ -88,10 +99,9 @@ class Twin:
         return sample_sensors(self.sensing, self.truth, self.disturbance.take(1)[0])
 
     def misses(self, ticks: int) -> NDArray[np.bool_]:
-        """Which of the next ticks the computer misses, shape (ticks,).
+        """Return which of the next ticks the computer misses, shape (ticks,).
 
-        Its outputs then stay as
-        they are.
+        Its outputs keep their values at a missed tick.
         """
         return self._missed.random(ticks) < self._share_missed
 
@@ -100,4 +110,4 @@ class Twin:
         self.held = commands
 
     def stop(self) -> None:
-        """Nothing to do: nothing moves unless written to."""
+        """Do nothing: a twin does not move unless written to."""

@@ -24,8 +24,8 @@ from rigtwin.models.commanding import (
     command_by_formula,
     commands_of,
 )
-from rigtwin.models.guided import Inertia
 from rigtwin.models.joint import JointModel
+from rigtwin.models.joint_motion import Inertia
 from rigtwin.models.start import Start
 from rigtwin.numerics.arrays import Array
 

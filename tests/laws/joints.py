@@ -11,7 +11,7 @@ from rigtwin.components.conditioning import actuator, hold
 from rigtwin.components.guide import friction
 from rigtwin.components.sensors import start_transducer, transducer
 from rigtwin.components.servo import push_law
-from rigtwin.models.guided import Inertia, Loop, integrate_pushed, inverse_dynamics
+from rigtwin.models.joint_motion import Inertia, Loop, integrate_pushed, inverse_dynamics
 from rigtwin.numerics.arrays import Array
 
 PERIOD = 1e-3

@@ -9,8 +9,8 @@ from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Machine, Row
 from rigtwin.hardware.daq.conversion import conversion, to_bits, to_values, to_volts
 from rigtwin.hardware.daq.table import ChannelTable
-from rigtwin.models.coupled_twin import begin_live
 from rigtwin.models.demands import list_sensors
+from rigtwin.models.forward_twin import begin_live
 from rigtwin.models.reading import hum_of, round_reading
 from rigtwin.numerics.arrays import Array
 

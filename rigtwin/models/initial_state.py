@@ -1,5 +1,4 @@
-"""Where joints that act on each other are and how fast they go when a recording starts, by the
-sensors that see them."""
+"""Initial positions and velocities of coupled joints, from the sensors that see them."""
 
 from __future__ import annotations
 
@@ -15,17 +14,28 @@ from rigtwin.numerics.arrays import Array
 from rigtwin.signals.noise import smallest_step, white_noise
 
 FIRMNESS, CLOSELY = 1e-3, 10.0
-"""Weights of where the MJCF has a joint and of a velocity that is measured, against a sensor of the
-position and its slope."""
+"""Least-squares weights of a joint's position in the MJCF and of a measured velocity. A measured
+position and its slope have weight 1."""
 Sense = Callable[[Array, int], Array]
-"""What is observed, shape (rows, ticks), from a start of shape (2, coordinates) and for so many
-ticks."""
+"""Function of an initial state, shape (2, coordinates), and a number of ticks that returns the
+predicted rows, shape (rows, ticks)."""
 
 
 @dataclass(frozen=True)
 class Seen:
-    """A sensor that sees joints. kind: position or velocity; along: coordinates that it adds up,
-    shape (coordinates,); zero: of that sum where the MJCF has it; measured: shape (ticks,)."""
+    """Sensor that sees coordinates.
+
+    Attributes
+    ----------
+    kind : str
+        Measured quantity: `position` or `velocity`.
+    along : Array
+        Direction of the sensor in the coordinates, shape (coordinates,).
+    zero : float
+        Position of the sensor at zero coordinates, m.
+    measured : Array
+        Signal of the sensor, shape (ticks,).
+    """
 
     kind: str
     along: Array
@@ -35,10 +45,26 @@ class Seen:
 
 @dataclass(frozen=True)
 class Judged:
-    """How a start is fitted. rows: to which of those observed; held: to what each is predicted at
-    best; errors: of the start as it is read, shape (2 · free joints,); slopes: of the rows by each
-    error, of the nominal machine: near enough for others; ticks: for which it is remembered;
-    responses: what each error changes in all rows, shape (all rows, all ticks, errors)."""
+    """Data by which an initial state is fitted.
+
+    Attributes
+    ----------
+    rows : tuple of int
+        Indices of the observed rows to which the state is fitted.
+    measured : Array
+        Measured signals of these rows, shape (rows, ticks).
+    held : Array
+        Standard deviation to which each row can be predicted at best, shape (rows,).
+    errors : Array
+        Standard errors of the state as read, shape (2 · free joints,).
+    slopes : Array
+        Change of the rows by one standard error of each unknown, shape (rows · ticks, unknowns).
+        They are those of the nominal machine, which serve for all candidates.
+    ticks : int
+        Ticks for which the machine remembers its initial state.
+    responses : Array
+        Change of all rows by each error, shape (all rows, all ticks, unknowns).
+    """
 
     rows: tuple[int, ...]
     measured: Array
@@ -49,12 +75,22 @@ class Judged:
     responses: Array
 
 
-class CoupledStart:
-    """Read from sensors; fitted where an error of it shows."""
+class InitialState:
+    """Initial state, read from sensors and fitted where its error matters.
+
+    Parameters
+    ----------
+    seen
+        Sensors that see coordinates, by name.
+    place
+        Positions of the coordinates in the MJCF, m, shape (coordinates,).
+    loose
+        Number of free coordinates; they come first.
+    period
+        Time from tick to tick, s.
+    """
 
     def __init__(self, seen: Mapping[str, Seen], place: Array, loose: int, period: float) -> None:
-        """place: where the MJCF has the coordinates; loose: of which so many, the first, are free;
-        period: s."""
         self._seen, self._place, self._loose, self._period = dict(seen), place, loose, period
         self._judged: Judged | None = None
         placed = [each.along for each in self._seen.values() if each.kind == "position"]
@@ -62,57 +98,61 @@ class CoupledStart:
 
     @property
     def sensors(self) -> tuple[str, ...]:
-        """Components that it is read from."""
+        """Names of the sensors that the state is read from."""
         return tuple(self._seen)
 
     @property
     def fitted(self) -> bool:
-        """Whether the error of a start shows."""
+        """Whether the error of the state as read is visible in the predictions."""
         return self._judged is not None
 
     def read(self, plant: Plant, swinging: bool = False) -> Array:
-        """Positions and velocities as the first samples have them, shape (2, coordinates). A joint
-        that no sensor sees is where the MJCF has it, at rest; one whose velocity alone is seen is
-        there too, or, if `swinging`, where it is about the middle of its swing."""
+        """Return positions and velocities by the first samples, shape (2, coordinates).
+
+        A joint without a sensor stands where the MJCF has it, at rest. A joint whose velocity alone
+        is measured stands there too; with `swinging`, its position is that of an oscillation about
+        zero.
+        """
+        # Weighted least squares, with the MJCF's position as a weak prior that makes it solvable.
         firm = FIRMNESS * np.eye(len(self._place))
         places: list[Array] = [firm]
         rates: list[Array] = [firm]
-        there: list[Array] = [FIRMNESS * self._place]
+        positions: list[Array] = [FIRMNESS * self._place]
         speeds: list[Array] = [np.zeros(len(self._place))]
-        for name, each in self._seen.items():
+        for name, seen in self._seen.items():
             sensor = getattr(plant, name)
-            value, slope = read_start(each.measured, self._period)
+            value, slope = read_start(seen.measured, self._period)
             value = (value - sensor.offset) / sensor.gain
-            if each.kind == "position":
-                places.append(each.along[None])
-                there.append(np.array([value - each.zero]))
-                rates.append(each.along[None])
+            if seen.kind == "position":
+                places.append(seen.along[None])
+                positions.append(np.array([value - seen.zero]))
+                rates.append(seen.along[None])
                 speeds.append(np.array([(slope - sensor.drift) / sensor.gain]))
                 continue
-            rates.append(CLOSELY * each.along[None])
+            rates.append(CLOSELY * seen.along[None])
             speeds.append(np.array([CLOSELY * value]))
-            if swinging and np.all(self._unplaced[each.along != 0.0]):
-                place, _ = guess_place(each.measured, self._period)
-                places.append(each.along[None])
-                there.append(np.array([place / sensor.gain]))
+            if swinging and np.all(self._unplaced[seen.along != 0.0]):
+                place, _ = guess_place(seen.measured, self._period)
+                places.append(seen.along[None])
+                positions.append(np.array([place / sensor.gain]))
         start = [
             np.linalg.lstsq(np.concatenate(rows), np.concatenate(values), rcond=None)[0]
-            for rows, values in ((places, there), (rates, speeds))
+            for rows, values in ((places, positions), (rates, speeds))
         ]
         return np.array(start, np.float64, order="C")
 
     def judge(self, plant: Plant, rows: Mapping[int, tuple[Seen, float]], sense: Sense) -> None:
-        """Find whether the error of a start as it is read shows, and for how long.
+        """Decide whether the error of the state as read is visible, and for how long.
 
         Parameters
         ----------
         plant
-            The machine as told.
+            Nominal components.
         rows
-            Number of a row observed → its sensor, and the error of the machine's form as a share of
-            what it reads; those of positions and velocities.
+            Index of each position or velocity row → its sensor, and the declared model error as a
+            share of the signal.
         sense
-            The machine from any start.
+            Prediction from any initial state.
         """
         if not rows:
             return
@@ -135,6 +175,8 @@ class CoupledStart:
         responses = find_slopes(predict, first, errors, whole.ravel())
         responses = responses.reshape(len(whole), ticks, -1)
         by_row = responses[numbers]
+        # Largest effect of any error at each tick, in standard deviations: its square sum is the χ²
+        # that a wrong initial state costs.
         size = np.max(np.abs(by_row) / held[:, None, None], axis=(0, 2))
         if float(np.sum(size**2)) <= SHOWS:
             return
@@ -151,32 +193,34 @@ class CoupledStart:
 
     @property
     def linear(self) -> bool:
-        """Whether `correct` may stand for `find`: a joint whose place no sensor sees may start far
-        from where it is read."""
+        """Whether the linear `correct` may replace `find`.
+
+        It may not where no sensor shows a free joint's position: its error is too large for that.
+        """
         return not self._unplaced[: self._loose].any()
 
     def correct(self, predicted: Array) -> Array:
-        """Add what errors of the start change in a prediction that begins where it is read.
+        """Correct a prediction for errors of the initial state, to first order.
 
         The errors are linear nuisance parameters θ with a prior of LIKELY standard errors: with S
-        the responses and r the residual, θ = (Sᵀ S + I / LIKELY²)⁻¹ Sᵀ r. One integration instead
-        of several, good enough to search by.
+        the responses and r the residual, θ = (Sᵀ S + I / LIKELY²)⁻¹ Sᵀ r. This takes one
+        integration instead of several and is accurate enough for a search.
 
         Parameters
         ----------
         predicted
-            Prediction of all rows, shape (rows, ticks).
+            Prediction of all rows from the state as read, shape (rows, ticks).
 
         Returns
         -------
         array
-            Shape (rows, ticks).
+            Corrected prediction, shape (rows, ticks).
         """
         judged = self._judged
         if judged is None:
             return predicted
         residual = judged.measured - predicted[list(judged.rows), : judged.ticks]
-        # A model that is far off elsewhere too is no reason to start otherwise.
+        # A wrong model must not be blamed on the initial state: its residual widens the tolerance.
         held = np.maximum(judged.held, np.sqrt(np.mean(residual**2, axis=1)))
         columns = judged.slopes / np.repeat(held, judged.ticks)[:, None]
         normal = columns.T @ columns + np.eye(columns.shape[1]) / LIKELY**2
@@ -184,14 +228,14 @@ class CoupledStart:
         return predicted + judged.responses @ errors
 
     def find(self, plant: Plant, sense: Sense) -> Array:
-        """The start as the sensors have it, shape (2, coordinates).
+        """Return the initial state, fitted if necessary, shape (2, coordinates).
 
         Parameters
         ----------
         plant
-            The machine.
+            Components of the machine.
         sense
-            It from any start.
+            Prediction from any initial state.
         """
         start, judged = self.read(plant), self._judged
         if judged is None:
@@ -200,6 +244,7 @@ class CoupledStart:
         def miss(start: Array) -> Array:
             return sense(start, judged.ticks)[list(judged.rows)] - judged.measured
 
+        # Without a position sensor, both guesses are tried: at rest in the MJCF, and swinging.
         starts = [start]
         if self._unplaced[: self._loose].any():
             starts.append(self.read(plant, swinging=True))
@@ -207,29 +252,29 @@ class CoupledStart:
         powers = [float(np.sum(np.mean(each**2, axis=1) / judged.held**2)) for each in misses]
         best = int(np.argmin(powers))
         start, first = starts[best], misses[best]
-        # A model that is far off elsewhere too is no reason to start otherwise.
-        left = np.sqrt(np.mean(first**2, axis=1))
-        found = fit_start(
+        # A wrong model must not be blamed on the initial state: its residual widens the tolerance.
+        rms = np.sqrt(np.mean(first**2, axis=1))
+        fitted_start = fit_start(
             self._from(start, judged.rows, sense, judged.ticks),
             judged.measured.ravel(),
             self._free(start),
             judged.errors,
-            np.repeat(np.maximum(judged.held, left), judged.ticks),
+            np.repeat(np.maximum(judged.held, rms), judged.ticks),
             judged.slopes,
             judged.measured.ravel() + first.ravel(),
         )
         fitted = start.copy()
-        fitted[:, : self._loose] = found.reshape(2, -1)
+        fitted[:, : self._loose] = fitted_start.reshape(2, -1)
         return fitted
 
     def _free(self, start: Array) -> Array:
-        """Positions and velocities of what is free, shape (2 · free joints,)."""
+        """Return positions and velocities of the free joints, shape (2 · free joints,)."""
         return start[:, : self._loose].ravel()
 
     def _from(
         self, start: Array, rows: Sequence[int], sense: Sense, ticks: int
     ) -> Callable[[Array], Array]:
-        """Rows, one after another, from any start of what is free."""
+        """Return a function that predicts the rows, flattened, from a state of the free joints."""
 
         def predict(first: Array) -> Array:
             begin = start.copy()
@@ -239,16 +284,16 @@ class CoupledStart:
         return predict
 
     def _find_errors(self, rows: Sequence[Seen], noises: Sequence[float], ticks: int) -> Array:
-        """Of the start as it is read, positions and velocities, shape (2 · free joints,)."""
+        """Return standard errors of the state as read, shape (2 · free joints,)."""
         pairs = list(zip(rows, noises, strict=True))
-        noise = max((own for each, own in pairs if each.kind == "position"), default=0.0)
+        noise = max((level for seen, level in pairs if seen.kind == "position"), default=0.0)
         errors = np.repeat(np.array(start_error(noise, self._period, ticks)), self._loose)
         errors = errors.reshape(2, -1)
-        for each, own in pairs:
-            for joint in np.nonzero(each.along[: self._loose])[0]:
-                if each.kind == "velocity" and self._unplaced[joint]:
-                    size = abs(float(each.along[joint]))
-                    errors[0, joint] = guess_place(each.measured, self._period)[1] / size
-                    errors[1, joint] = ERRORS * own / size
-        # What no row of these sees is known as badly as the rest.
+        for seen, level in pairs:
+            for joint in np.nonzero(seen.along[: self._loose])[0]:
+                if seen.kind == "velocity" and self._unplaced[joint]:
+                    size = abs(float(seen.along[joint]))
+                    errors[0, joint] = guess_place(seen.measured, self._period)[1] / size
+                    errors[1, joint] = ERRORS * level / size
+        # A joint that no sensor sees gets the largest error of all.
         return np.where(errors > 0.0, errors, np.max(errors, axis=1, keepdims=True)).ravel()

@@ -1,5 +1,4 @@
-"""The twin of a joint that is moved as prescribed and acts on no other: what its sensors read in a
-test."""
+"""Twin of a single joint with prescribed motion: sensor readings of a test."""
 
 from __future__ import annotations
 
@@ -12,33 +11,33 @@ from rigtwin.components.sensors import apply_sensor
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Machine, ReplayOf, Row
 from rigtwin.models.inputs import inputs_of_test
+from rigtwin.models.inverse_twin import SimulatedSignals
 from rigtwin.models.joint import JointModel
-from rigtwin.models.moved_twin import Moved
 from rigtwin.models.reading import sensors_of
 from rigtwin.numerics.arrays import Array, has_diverged
 
 
-def carry(
+def simulate_joint(
     machine: Machine, replay: ReplayOf, configuration: Configuration, demands: dict[str, Array]
-) -> Moved:
-    """What the sensors read, noise and bits apart.
+) -> SimulatedSignals:
+    """Simulate a test of a joint with prescribed motion that acts on no other joint.
 
     Parameters
     ----------
     machine
-        Its description.
+        Description of the machine.
     replay
-        Of its joint.
+        Replay of the joint.
     configuration
-        With the effects that it has.
+        Settings of the test, with the effects applied.
     demands
-        What moves the joint → where it goes, or the command of its position actuator, shape
+        Position sensor or position actuator of the joint → position or command, m or rad, shape
         (ticks,).
 
     Returns
     -------
-    Moved
-        What all sensors of that joint read.
+    SimulatedSignals
+        Readings of all sensors of the joint, without noise and quantisation.
     """
     plant, period, components = configuration.plant, configuration.timing.period, machine.components
     (mover,) = replay.moved_by
@@ -47,8 +46,8 @@ def carry(
         channel = components[name].channel
         if components[name].joint == replay.joint.name and channel is not None:
             rows.append(Row(name, measures(getattr(plant, name)), channel, components[name].unit))
-    nothing = {row.name: np.zeros(len(demands[mover])) for row in rows}
-    inputs = inputs_of_test(machine, {**nothing, **demands}, period)
+    no_signal = {row.name: np.zeros(len(demands[mover])) for row in rows}
+    inputs = inputs_of_test(machine, {**no_signal, **demands}, period)
     observed = replace(replay, rows=tuple(rows))
     model = JointModel(machine, observed, inputs, configuration, configuration.substeps)
     if measures(getattr(plant, mover)):
@@ -56,8 +55,8 @@ def carry(
     else:
         moved = model.move(plant)
     places = {"position": 0, "velocity": 1, "force": 2}
-    found = {
+    readings = {
         row.name: apply_sensor(getattr(plant, row.name), moved[places[row.kind]], period)
         for row in rows
     }
-    return Moved(found, not has_diverged(moved))
+    return SimulatedSignals(readings, not has_diverged(moved))

@@ -16,7 +16,7 @@ from rigtwin.description.document import examine, load
 from rigtwin.description.machine import Machine
 from rigtwin.diagnosis.stops import find_cut_commands
 from rigtwin.errors import RigtwinError
-from rigtwin.models.coupled import CoupledModel
+from rigtwin.models.forward_dynamics import ForwardDynamicsModel
 from tests.helpers.coupled import ARM, ARM_TOML, PERIOD, arm, described, integrate, recording
 
 TIME = np.arange(1000) * PERIOD
@@ -56,14 +56,14 @@ def slides(folder: Path, replay: str, extra: str = "") -> Machine:
 
 def coupled(
     machine: Machine, columns: dict[str, dict[str, np.ndarray]], steps: int = 1
-) -> CoupledModel:
+) -> ForwardDynamicsModel:
     record = recording(machine, columns)
     model = machine.physics.model(machine, record.inputs, machine.configuration_of(record), steps)
-    assert isinstance(model, CoupledModel)
+    assert isinstance(model, ForwardDynamicsModel)
     return model
 
 
-def test_a_double_pendulum_pushed_at_both_joints_goes_as_lagrange_has_it(tmp_path: Path) -> None:
+def test_a_pushed_double_pendulum_follows_lagranges_equations(tmp_path: Path) -> None:
     machine = arm(tmp_path)
     assert machine.kind == "free joints"
     expected = integrate(TORQUES, (0.3, -0.2), (0.0, 0.0))[0]
@@ -80,7 +80,7 @@ def test_a_double_pendulum_pushed_at_both_joints_goes_as_lagrange_has_it(tmp_pat
     assert errors[2] < 0.4 * errors[0]
 
 
-def test_two_masses_and_a_spring_go_as_their_modes_do(tmp_path: Path) -> None:
+def test_two_masses_and_a_spring_move_in_their_modes(tmp_path: Path) -> None:
     machine = slides(tmp_path, FREE)
     push = np.zeros(1000)
     push[100:] = 1.5
@@ -114,7 +114,7 @@ def test_dry_friction_holds_below_its_limit_and_slows_evenly_above(tmp_path: Pat
     assert sliding[0, 1, -1] == pytest.approx(0.5 * (6.0 - 4.0) / 3.5 * TIME[-1] ** 2, rel=5e-3)
 
 
-def test_what_several_rub_on_one_body_adds_up(tmp_path: Path) -> None:
+def test_friction_of_several_guides_on_one_body_adds_up(tmp_path: Path) -> None:
     """Friction at two coordinates of one body holds what neither alone could."""
     machine = slides(tmp_path, LED)
     still = np.zeros(1000)
@@ -126,7 +126,7 @@ def test_what_several_rub_on_one_body_adds_up(tmp_path: Path) -> None:
     assert np.max(np.abs(model.move(one)[0, 0])) > 1.0
 
 
-def test_a_joint_that_is_led_takes_the_force_that_mujoco_says(tmp_path: Path) -> None:
+def test_a_prescribed_joint_needs_the_force_that_mujoco_computes(tmp_path: Path) -> None:
     led = 'free = ["elbow"]\nmoved_by = ["angle_1", "drive_2"]\nobserve = ["angle_2", "torque_1"]\n'
     head = ARM_TOML.split("free =")[0].replace(
         "[[replays]]", 'torque_1 = { sensor = "torque_1", effects = [] }\n[[replays]]'
@@ -158,7 +158,7 @@ def test_a_joint_that_is_led_takes_the_force_that_mujoco_says(tmp_path: Path) ->
     assert np.max(np.abs(expected[1] - record["/command"]["drive_2"])[inside]) < 0.01 * size
 
 
-def test_a_joint_tied_to_another_goes_with_it(tmp_path: Path) -> None:
+def test_a_tied_joint_moves_with_its_coordinate(tmp_path: Path) -> None:
     tied = '<equality><joint joint1="two" joint2="one" polycoef="0 2 0 0 0"/></equality>'
     replay = 'free = ["one"]\nmoved_by = ["push"]\nobserve = ["x_one", "x_two"]\n'
     machine = slides(tmp_path, replay, tied)
@@ -275,7 +275,7 @@ def test_an_actuator_takes_no_command_beyond_its_range_whatever_its_gain(tmp_pat
         ),
     ],
 )
-def test_a_replay_that_cannot_be_is_refused(tmp_path: Path, replay: str, said: str) -> None:
+def test_an_impossible_replay_is_refused(tmp_path: Path, replay: str, said: str) -> None:
     (tmp_path / "slides.xml").write_text(SLIDES.format(extra=""))
     (tmp_path / "slides.toml").write_text(SLIDES_TOML + replay)
     with pytest.raises(RigtwinError, match=said):
@@ -293,9 +293,7 @@ def test_a_replay_that_cannot_be_is_refused(tmp_path: Path, replay: str, said: s
         ('command_high = "wide"', "command_high"),
     ],
 )
-def test_limits_of_a_command_that_cannot_be_are_refused(
-    tmp_path: Path, limits: str, said: str
-) -> None:
+def test_impossible_command_limits_are_refused(tmp_path: Path, limits: str, said: str) -> None:
     push = f'push = {{ actuator = "push", {limits} }}'
     toml = "\n".join(
         push if line.startswith("push = ") else line for line in SLIDES_TOML.splitlines()
@@ -307,7 +305,7 @@ def test_limits_of_a_command_that_cannot_be_are_refused(
         load(tmp_path / "slides.toml")
 
 
-def test_what_a_twin_records_its_model_predicts_to_the_noise(tmp_path: Path) -> None:
+def test_the_model_predicts_the_twins_recording_to_the_noise(tmp_path: Path) -> None:
     machine = rigtwin.machine("cart-pole")
     record = rigtwin.run(machine, "pushes", path=tmp_path / "run.mcap")
     configuration = machine.configuration_of(record)
@@ -318,7 +316,7 @@ def test_what_a_twin_records_its_model_predicts_to_the_noise(tmp_path: Path) -> 
         assert np.std(left) < 1.2 * noise
 
 
-def test_a_search_takes_longer_steps_where_they_change_next_to_nothing(tmp_path: Path) -> None:
+def test_a_search_uses_longer_steps_only_where_they_change_little(tmp_path: Path) -> None:
     machine = rigtwin.machine("cart-pole")
     record = rigtwin.run(machine, "pushes", path=tmp_path / "run.mcap")
     configuration = machine.configuration_of(record)
@@ -354,7 +352,7 @@ def test_a_hidden_effect_is_found_at_its_joint(
         ({"centre_x": 0.1}, 'mass="1.2" pos="0.1 0 -0.15" diaginertia="0.012 0.012 0.001"'),
     ],
 )
-def test_another_body_swings_as_that_of_a_changed_mjcf(
+def test_a_changed_body_moves_as_in_a_changed_mjcf(
     tmp_path: Path, values: dict[str, float], instead: str
 ) -> None:
     body = '[components.lower]\nbody = "lower"\ntype = "body"\n[components.floor]\nbody = "upper"\n'

@@ -1,8 +1,13 @@
-"""Joints that act on each other, each moved as its sensor measured: the forces that this takes.
+"""Model of coupled joints whose motions are all measured: inverse dynamics.
 
-The bodies' own share is MuJoCo's inverse dynamics of the measured motions. What the description
-names of joints and couplings (guides with their friction and springs, rotors) comes on top, each
-along its own coordinate: that of a joint, or the sum of joints that a fixed tendon makes.
+The forces that the measured motion q(t) requires are
+
+    τ = M(q)·q'' + c(q, q') + Y(q, q', q'')·Δπ + Σ_g a_g·f_g + Σ_r a_r·J_r·(a_r·q'')
+
+MuJoCo computes M and c of the MJCF's bodies. Forces are linear in the bodies' inertial parameters,
+so their changes Δπ enter through the regressor Y (Atkeson, An and Hollerbach 1986; see
+`components.body`). Guides (friction and springs f_g) and rotors (inertia J_r) act along directions
+of their own: one joint, or the sum of joints that a fixed tendon makes.
 """
 
 from __future__ import annotations
@@ -21,8 +26,8 @@ from rigtwin.components.plant import Plant
 from rigtwin.components.sensors import apply_sensor
 from rigtwin.description.machine import Component, Machine, ReplayOf, Row
 from rigtwin.models.basis import Passage, forms
-from rigtwin.models.guided import resist, resist_at_once
 from rigtwin.models.joint import ELASTIC, KEPT, SEED, SMALL, recover_motion
+from rigtwin.models.joint_motion import resist, resist_at_once
 from rigtwin.models.model import Form, Model
 from rigtwin.models.rigid import RigidBodies
 from rigtwin.numerics.arrays import Array
@@ -31,19 +36,34 @@ from rigtwin.signals.band import limit_band
 from rigtwin.signals.noise import smooth, white_noise
 
 STANDING, RESTING = 0.02, 0.1
-"""Share of its rms speed below which a joint stands, and s for which it does to be at rest."""
+"""Share of its rms speed below which a joint stands still, and shortest rest, s."""
 ENDS = 0.3
-"""s at both ends of a recording, where smoothing does not know how a motion goes on."""
+"""Time at both ends of a recording where the smoothed motion is uncertain, s."""
 REGRESSORS = 40
-"""Regressors of bodies that are remembered: a search returns to few motions."""
+"""Number of remembered regressors. A search returns to few motions."""
 DRAWS = 2
-"""Times that the motions' noise is drawn."""
+"""Number of draws of the motions' noise."""
 Kinematics = Array
 """Positions, velocities and accelerations, shape (3, joints, ticks)."""
 
 
-class MovedModel(Model[Plant]):
-    """All joints of one recording."""
+class InverseDynamicsModel(Model[Plant]):
+    """Inverse-dynamics model of all coupled joints of one recording.
+
+    Parameters
+    ----------
+    machine, replay, inputs
+        Machine, its replay and the recorded signals, as in `Physics.model`.
+    every
+        Ticks of the recording from one predicted tick to the next.
+    like
+        Model of the same recording whose smoothed motions are reused.
+
+    Raises
+    ------
+    RigtwinError
+        If a channel is missing from the recording.
+    """
 
     def __init__(
         self,
@@ -51,10 +71,8 @@ class MovedModel(Model[Plant]):
         replay: ReplayOf,
         inputs: Inputs,
         every: int = 1,
-        like: MovedModel | None = None,
+        like: InverseDynamicsModel | None = None,
     ) -> None:
-        """every: ticks from one that is predicted to the next; like: one of the same recording,
-        whose motions were smoothed already. Raises RigtwinError if a channel is missing."""
         self._machine, self._replay, self._signals = machine, replay, inputs
         self._period = inputs.period
         self.every = every
@@ -73,9 +91,9 @@ class MovedModel(Model[Plant]):
         self._heavy = {component.name: component.mjcf for component in at[Body]}
         self._base = at[Base][0].name if at[Base] else None
         self._along: dict[str, Array] = {}
-        """Component → how far it goes for each joint's unit, shape (joints,)."""
+        """Component → its direction in the joints, shape (joints,)."""
         self._onto: dict[str, Array] = {}
-        """Component → what its force does to each row, shape (rows,)."""
+        """Component → share of its force in each observed row, shape (rows,)."""
         for component in (*at[Guide], *at[Rotor]):
             along, onto = np.zeros(len(joints)), np.zeros(len(self.rows))
             for joint, coefficient in component.acts_on:
@@ -100,8 +118,8 @@ class MovedModel(Model[Plant]):
         return math.inf if self._replay.band is None else self._replay.band
 
     @property
-    def _apart(self) -> float:
-        """s, from one tick that is predicted to the next."""
+    def _interval(self) -> float:
+        """Time from one predicted tick to the next, s."""
         return self.every * self._period
 
     def _measured(self, name: str) -> Array:
@@ -112,14 +130,18 @@ class MovedModel(Model[Plant]):
     def _smooth(self, signal: Array) -> tuple[Array, float]:
         return smooth(signal, self._period)
 
-    def thin(self, longest: float) -> MovedModel:
+    def thin(self, longest: float) -> InverseDynamicsModel:
         every = max(int(longest / self._period), 1)
         if every <= self.every:
             return self
-        return MovedModel(self._machine, self._replay, self._signals, every, self)
+        return InverseDynamicsModel(self._machine, self._replay, self._signals, every, self)
 
     def _move(self, plant: Plant, shifts: Mapping[str, Array] | None = None) -> Kinematics:
-        """How the joints move. shifts: of measured motions, shape (ticks,) of the recording."""
+        """Return the joints' motion by the sensors.
+
+        `shifts` maps a sensor to a displacement of its motion, m or rad, shape (ticks,), at the
+        recording's own ticks.
+        """
         positions = []
         for name in self._movers:
             signal = self._read[name][0]
@@ -128,14 +150,16 @@ class MovedModel(Model[Plant]):
             sensor: PositionSensor = getattr(plant, name)
             positions.append(recover_motion(sensor, signal, self._period))
         position = np.stack(positions)
-        # Differences of the recording's own ticks: what is left out is not differentiated over.
+        # Differentiate before thinning: differences over dropped ticks would smooth the motion.
         velocity = np.gradient(position, self._period, axis=1)
         acceleration = np.gradient(velocity, self._period, axis=1)
         return np.stack([position, velocity, acceleration])[:, :, :: self.every]
 
     def _moved(self, plant: Plant) -> tuple[Kinematics, Array]:
-        """How the joints move, and the forces that this takes of the bodies as the MJCF has them,
-        shape (joints, ticks); the base may be off level."""
+        """Return the joints' motion and the forces of the MJCF's bodies, N, shape (joints, ticks).
+
+        Gravity is that of the plant's base, which may be tilted.
+        """
         key = self._key(plant)
         if key not in self._motions:
             motion = self._move(plant)
@@ -144,7 +168,7 @@ class MovedModel(Model[Plant]):
         return self._motions[key]
 
     def _key(self, plant: Plant) -> tuple[object, ...]:
-        """What motion and gravity depend on."""
+        """Return all components that motion and gravity depend on."""
         names = (*self._movers, self._base) if self._base is not None else self._movers
         return tuple(getattr(plant, name) for name in names)
 
@@ -152,16 +176,18 @@ class MovedModel(Model[Plant]):
         return None if self._base is None else self._bodies.turn(getattr(plant, self._base))
 
     def _loaded(self, plant: Plant) -> tuple[Kinematics, Array]:
-        """The same with what is other about the bodies."""
+        """Return the joints' motion and the forces of the plant's bodies, N."""
         motion, forces = self._moved(plant)
         return motion, forces + self._surplus(plant, motion, self._key(plant))
 
     def _surplus(
         self, plant: Plant, motion: Kinematics, key: tuple[object, ...] | None = None
     ) -> Array | float:
-        """What the forces are more than with the MJCF's bodies: linear in what is other about them.
-        key: of the motion, where what each parameter does may be remembered."""
-        found: Array | float = 0.0
+        """Return Y·Δπ, the forces of the plant's bodies less those of the MJCF's, N.
+
+        `key` names the motion where its regressors may be remembered.
+        """
+        surplus: Array | float = 0.0
         for name, mjcf in self._heavy.items():
             more = list_surplus(getattr(plant, name), *self._bodies.list_nominal(mjcf))
             if not more.any():
@@ -170,17 +196,18 @@ class MovedModel(Model[Plant]):
             if columns is None:
                 columns = self._bodies.regressor(motion, mjcf, self._gravity(plant))
             if key is not None:
-                kept = dict(list(self._columns.items())[-REGRESSORS:])
-                self._columns = {**kept, (name, key): columns}
-            found = found + np.tensordot(more, columns, 1)
-        return found
+                remembered = dict(list(self._columns.items())[-REGRESSORS:])
+                self._columns = {**remembered, (name, key): columns}
+            surplus = surplus + np.tensordot(more, columns, 1)
+        return surplus
 
     def _share_of(self, name: str, plant: Plant, motion: Kinematics, bodies: Array) -> Array:
-        """The force along a component's own coordinate, shape (ticks,)."""
+        """Return the force of a guide or rotor along its own direction, N, shape (ticks,)."""
         component, along = getattr(plant, name), self._along[name]
         if isinstance(component, Rotor):
             return component.inertia * (along @ motion[2])
         guide = Guide(*(float(value) for value in component))
+        # A guide whose only values are the shapes of absent effects exerts no force.
         if guide == Guide(
             stribeck_velocity=guide.stribeck_velocity,
             stribeck_exponent=guide.stribeck_exponent,
@@ -188,63 +215,66 @@ class MovedModel(Model[Plant]):
             cogging_phase=guide.cogging_phase,
         ):
             return np.zeros(motion.shape[2])
-        own = np.ascontiguousarray(np.einsum("j,kjt->kt", along, motion))
+        guide_motion = np.ascontiguousarray(np.einsum("j,kjt->kt", along, motion))
         load = along @ bodies / float(along @ along)
         out = load.copy()
         if guide.compliance == guide.mount_compliance == guide.backlash == 0.0:
-            resist_at_once(guide, friction(guide), 0.0, self._apart, own, out)
+            resist_at_once(guide, friction(guide), 0.0, self._interval, guide_motion, out)
             return out - load
         resist(
             guide=guide,
             dry_friction=friction(guide),
-            spring=1.0 / self._softest(guide, own, load, along),
+            spring=1.0 / self._softest(guide, guide_motion, load, along),
             rest=0.0,
-            period=self._apart,
-            motion=own,
+            period=self._interval,
+            motion=guide_motion,
             out=out,
         )
         return out - load
 
-    def _softest(self, guide: Guide, own: Array, load: Array, along: Array) -> float:
-        """Compliance over which friction that reverses builds up: no less than what the measured
-        motions' errors hide."""
+    def _softest(self, guide: Guide, motion: Array, load: Array, along: Array) -> float:
+        """Return the compliance in series with dry friction, m/N.
+
+        The error of the measured motion hides smaller ones: friction that reverses builds up over
+        at least that distance.
+        """
         size = max(friction_size(friction(guide), float(np.sqrt(np.mean(load**2)))), 1e-300)
         errors = np.array([self._read[name][1] for name in self._movers])
         error = float(np.sqrt(np.sum((along * errors) ** 2)))
-        stroke = max(float(np.ptp(own[0])), 1e-12)
+        stroke = max(float(np.ptp(motion[0])), 1e-12)
         return max(guide.compliance, ELASTIC * error / size, 1e-9 * stroke / size)
 
     def _force_of(self, name: str, plant: Plant) -> Array:
-        """The same, remembered."""
+        """Return `_share_of` at the plant's own motion, remembered."""
         heavy = (getattr(plant, each) for each in self._heavy)
         key = (name, getattr(plant, name), *self._key(plant), *heavy)
-        found = self._shares.get(key)
-        if found is None:
-            found = self._share_of(name, plant, *self._loaded(plant))
+        force = self._shares.get(key)
+        if force is None:
+            force = self._share_of(name, plant, *self._loaded(plant))
             most = KEPT * max(len(self._along), 1)
-            self._shares = {**dict(list(self._shares.items())[-most:]), key: found}
-        return found
+            self._shares = {**dict(list(self._shares.items())[-most:]), key: force}
+        return force
 
     def _rows_of(self, bodies: Array) -> Array:
         places = [self._place[self._machine.components[row.name].joint] for row in self.rows]
         return bodies[places]
 
     def predict_true(self, plant: Plant) -> Array:
-        found = self._rows_of(self._loaded(plant)[1]).copy()
+        forces = self._rows_of(self._loaded(plant)[1]).copy()
         for name, onto in self._onto.items():
             force = self._force_of(name, plant)
             for row in np.nonzero(onto)[0]:
-                found[row] += onto[row] * force
-        return found
+                forces[row] += onto[row] * force
+        return forces
 
     def _apply_sensors(self, plant: Plant, true: Array) -> Array:
         sensed = np.stack(
             [
-                apply_sensor(getattr(plant, row.name), signal, self._apart)
+                apply_sensor(getattr(plant, row.name), signal, self._interval)
                 for row, signal in zip(self.rows, true, strict=True)
             ]
         )
-        return limit_band(sensed, self.band, self._apart)
+        return limit_band(sensed, self.band, self._interval)
 
     def predict(self, plant: Plant) -> Array:
         return self._apply_sensors(plant, self.predict_true(plant))
@@ -253,15 +283,15 @@ class MovedModel(Model[Plant]):
         if entry in self._onto:
             true = self.predict_true(plant) + self._onto[entry][:, None] * amount
             return self._apply_sensors(plant, true)
-        found = self.predict(plant)
-        found[[row.name for row in self.rows].index(entry)] += amount
-        return found
+        predicted = self.predict(plant)
+        predicted[[row.name for row in self.rows].index(entry)] += amount
+        return predicted
 
     def components(self) -> tuple[str, ...]:
         return (*self._onto, *(row.name for row in self.rows))
 
     def _passage(self, component: str, plant: Plant) -> tuple[Kinematics, Array, Array]:
-        """How a component's coordinate moves, shape (3, ticks), its load, and the force there."""
+        """Return a component's motion, shape (3, ticks), its load and its force, N."""
         motion, bodies = self._loaded(plant)
         along = self._along.get(component)
         if along is None:
@@ -272,14 +302,14 @@ class MovedModel(Model[Plant]):
         else:
             onto = self._onto[component]
             force = onto @ self.predict_true(plant) / float(onto @ onto)
-        own = np.einsum("j,kjt->kt", along, motion)
-        return own, along @ bodies / float(along @ along), force
+        component_motion = np.einsum("j,kjt->kt", along, motion)
+        return component_motion, along @ bodies / float(along @ along), force
 
     def forms(self, component: str, plant: Plant) -> list[Form]:
         (position, speed, _), load, force = self._passage(component, plant)
         part = getattr(plant, component)
         role = "sensor" if measures(part) else "mass" if isinstance(part, Rotor) else "guide"
-        return forms(role, component, Passage(force, position, speed, load, self._apart))
+        return forms(role, component, Passage(force, position, speed, load, self._interval))
 
     def disturbance_size(self, entry: str) -> float:
         return SMALL * max(float(np.std(self._passage(entry, self._machine.plant)[2])), 1e-9)
@@ -291,42 +321,48 @@ class MovedModel(Model[Plant]):
         return Motion(position, speed, force)
 
     def undetermined(self) -> NDArray[np.bool_]:
-        """Where a joint rests, dry friction bears what nobody knows, up to its limits; at both
-        ends, accelerations are not known."""
-        from scipy.ndimage import binary_opening  # Late: it takes its time.
+        """Return the ticks at which the measured motion does not determine the forces.
+
+        The dry friction of a joint at rest may have any value within its limits. At both ends of
+        the recording, accelerations are unknown.
+        """
+        from scipy.ndimage import binary_opening  # Imported late: scipy is slow to load.
 
         speeds = self._moved(self._machine.plant)[0][1]
-        found = np.zeros((len(self.rows), speeds.shape[1]), bool)
-        end = round(ENDS / self._apart)
-        found[:, :end] = found[:, -end:] = True
-        window = max(round(RESTING / self._apart), 3)
+        unknown = np.zeros((len(self.rows), speeds.shape[1]), bool)
+        end = round(ENDS / self._interval)
+        unknown[:, :end] = unknown[:, -end:] = True
+        window = max(round(RESTING / self._interval), 3)
         for name, onto in self._onto.items():
             if isinstance(getattr(self._machine.plant, name), Guide):
                 speed = np.abs(self._along[name] @ speeds)
                 stands = speed < STANDING * float(np.sqrt(np.mean(speed**2)))
-                found |= (onto != 0.0)[:, None] & binary_opening(stands, np.ones(window))
-        return found
+                unknown |= (onto != 0.0)[:, None] & binary_opening(stands, np.ones(window))
+        return unknown
 
     def propagated_noise(self, plant: Plant) -> Array | None:
-        """What the noise of the measured motions makes of the forces, by its way through smoothing,
-        differentiation and the dynamics of all joints.
+        """Return the change of the forces by the noise of the measured motions.
 
-        The mean of several draws, as strong as one: whether dry friction reverses in the right tick
-        is a matter of few reversals.
+        The noise passes through smoothing, differentiation and the dynamics of all joints. Several
+        draws are added and divided by the root of their number, which keeps the strength of one:
+        the error where dry friction reverses comes from few ticks, so a single draw is uncertain.
         """
-        own, total = self.predict_true(plant), np.zeros(())
+        undisturbed, total = self.predict_true(plant), np.zeros(())
         motions = self._draw_motions(plant)
         for number, (motion, forces) in enumerate(motions):
             bodies = forces + self._surplus(plant, motion, (number, *self._key(plant)))
-            found = self._rows_of(bodies).copy()
+            forces_drawn = self._rows_of(bodies).copy()
             for name, onto in self._onto.items():
-                found += onto[:, None] * self._share_of(name, plant, motion, bodies)
-            total = total + (found - own) / math.sqrt(len(motions))
-        return limit_band(total, self.band, self._apart) if total.shape else None
+                forces_drawn += onto[:, None] * self._share_of(name, plant, motion, bodies)
+            total = total + (forces_drawn - undisturbed) / math.sqrt(len(motions))
+        return limit_band(total, self.band, self._interval) if total.shape else None
 
     def _draw_motions(self, plant: Plant) -> list[tuple[Kinematics, Array]]:
-        """Motions as they may be with other noise, and the forces that they take of the MJCF's
-        bodies; none if there is no noise. The last ones are remembered."""
+        """Return motions with redrawn noise, and the forces of the MJCF's bodies for them.
+
+        The list is empty if the motions have no noise. The last lists are remembered.
+        """
+        # The seed is fixed, or the same candidate would get another misfit when tried again.
         key = self._key(plant)
         if key not in self._drawn:
             random, drawn = np.random.default_rng(SEED), []

@@ -1,8 +1,9 @@
-"""Joints that act on each other, some of them predicted: pushed by force actuators, by each other
-and by others that move as measured or as commanded.
+"""Model of joints that act on each other and of which some are free: forward dynamics.
 
-What is prescribed moves the machine as a road moves a car; all else goes as its equations of motion
-have it, from where the sensors see it start.
+A coordinate is either prescribed or free. Position sensors and position actuators prescribe motion,
+as a road prescribes the motion of a wheel. Free coordinates follow from the equation of motion
+(`forward_motion`) under force actuators, servos, guides and the prescribed coordinates, starting
+from the state that the sensors show.
 """
 
 from __future__ import annotations
@@ -35,11 +36,11 @@ from rigtwin.components.servo import Push, push, push_law
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Component, Machine, ReplayOf, Row
 from rigtwin.models.basis import Passage, forms
-from rigtwin.models.coupled_motion import Contacts, Servos, State, StepInputs, advance
-from rigtwin.models.coupled_start import CoupledStart, Seen, Sense
 from rigtwin.models.following import follow_command
-from rigtwin.models.guided import RIGID
+from rigtwin.models.forward_motion import Contacts, Servos, State, StepInputs, advance
+from rigtwin.models.initial_state import InitialState, Seen, Sense
 from rigtwin.models.joint import ELASTIC, KEPT, LIGHTEST, SEED, SMALL, recover_motion
+from rigtwin.models.joint_motion import RIGID
 from rigtwin.models.model import Form, Model
 from rigtwin.models.multibody import Multibody, inertia_at
 from rigtwin.numerics.arrays import Array, clip_diverged, interpolate
@@ -47,17 +48,18 @@ from rigtwin.recording import Inputs
 from rigtwin.signals.noise import smooth, white_noise
 
 SHAPES = ("stribeck_velocity", "stribeck_exponent", "cogging_pitch", "cogging_phase")
-"""Parameters of a guide that alone do nothing."""
+"""Parameters of a guide that have no effect without another parameter."""
 COMMANDED = "/command"
-"""Topic whose signals are held from tick to tick."""
+"""Topic of the signals that are held from tick to tick."""
 COARSER = 2.0
-"""Times as long steps as others search with: each is checked against the exact prediction."""
+"""Factor on the longest step of a search. Each step is checked against the exact prediction, so it
+may be tried longer than in models without this check."""
 THINNED = 5e-3
-"""Share of a signal's own swing that longer steps may change for a search."""
+"""Largest change of a signal by longer steps in a search, as a share of its standard deviation."""
 
 
-class CoupledModel(Model[Plant]):
-    """All joints of one recording."""
+class ForwardDynamicsModel(Model[Plant]):
+    """Forward-dynamics model of all coupled joints of one recording."""
 
     def __init__(
         self,
@@ -95,6 +97,7 @@ class CoupledModel(Model[Plant]):
         self._pushers = [n for n in replay.moved_by if isinstance(getattr(plant, n), ForceActuator)]
         self._servos = [n for n in replay.moved_by if isinstance(getattr(plant, n), Servo)]
         self._leaders = [n for n in replay.moved_by if n not in (*self._pushers, *self._servos)]
+        # The free coordinates come first, the prescribed ones after them.
         joints = [*replay.free, *(components[name].joint for name in self._leaders)]
         at: dict[type, list[Component]] = {Guide: [], Rotor: [], Body: [], Base: []}
         for component in components.values():
@@ -113,6 +116,16 @@ class CoupledModel(Model[Plant]):
         self._loose = len(replay.free)
         self._free = np.arange(self._loose)
         self._held = np.arange(len(replay.free), len(joints))
+        self._read_motions(inputs)
+        self._loosest = self._find_loosest()
+        self._changed: dict[tuple[object, ...], Multibody] = {}
+        self._last: dict[tuple[object, ...], Array] = {}
+        self._starts: dict[tuple[object, ...], Array] = {}
+        self._judge_start()
+
+    def _read_motions(self, inputs: Inputs) -> None:
+        """Smooth the prescribed motions and collect the sensors that show the initial state."""
+        components, plant = self._machine.components, self._configuration.plant
         self._read = {
             name: smooth(self._column(name), self._period)
             for name in self._leaders
@@ -125,21 +138,16 @@ class CoupledModel(Model[Plant]):
             and component.channel in inputs.channels
             and self._along[name].any()
         }
-        self._start = CoupledStart(seen, self._bodies.place(), self._loose, self._period)
-        self._loosest = self._find_loosest()
-        self._changed: dict[tuple[object, ...], Multibody] = {}
-        self._last: dict[tuple[object, ...], Array] = {}
-        self._starts: dict[tuple[object, ...], Array] = {}
-        self._judge_start()
+        self._start = InitialState(seen, self._bodies.place(), self._loose, self._period)
 
-    def halve_steps(self) -> CoupledModel:
+    def halve_steps(self) -> ForwardDynamicsModel:
         return self._with_steps(max(1, self._steps // 2))
 
-    def double_steps(self) -> CoupledModel:
+    def double_steps(self) -> ForwardDynamicsModel:
         return self._with_steps(2 * self._steps)
 
-    def _with_steps(self, steps: int) -> CoupledModel:
-        return CoupledModel(
+    def _with_steps(self, steps: int) -> ForwardDynamicsModel:
+        return ForwardDynamicsModel(
             self._machine,
             self._replay,
             self._signals,
@@ -149,7 +157,7 @@ class CoupledModel(Model[Plant]):
             self._quick,
         )
 
-    def thin(self, longest: float) -> CoupledModel:
+    def thin(self, longest: float) -> ForwardDynamicsModel:
         """Return a coarser model for a search: fewer ticks and longer integration steps, as long
         as they change next to nothing, and errors of the start taken as linear."""
         plant = self._configuration.plant
@@ -159,7 +167,7 @@ class CoupledModel(Model[Plant]):
         for every, steps in self._list_grids(longest):
             if (every, steps, quick) == (1, self._steps, False):
                 break
-            coarser = CoupledModel(
+            coarser = ForwardDynamicsModel(
                 self._machine,
                 self._replay,
                 _average_commands(self._signals, every),
@@ -190,29 +198,34 @@ class CoupledModel(Model[Plant]):
         return self._signals.column(*channel)
 
     def _find_loosest(self) -> Array:
-        """The inertia that each guide feels where nothing else holds its joints, at the start."""
+        """Return the smallest inertia that each guide can feel at the start, kg, shape (guides,).
+
+        That is 1 / (aᵀ M⁻¹ a), with the guide's direction a and all other coordinates free to move
+        (the operational-space inertia; Khatib, IEEE Journal of Robotics and Automation 3(1), 1987).
+        """
         plant = self._configuration.plant
         free = len(self._free)
         data = self._bodies.data()
         bodies = self._bodies.bodies(data, self._turning(plant))
         inertia = inertia_at(bodies, self._start.read(plant)[0])[:free, :free]
-        found = np.full(len(self._guides), 1.0)
+        smallest = np.full(len(self._guides), 1.0)
         for number, name in enumerate(self._guides):
             along = self._along[name][:free]
             if along.any():
-                found[number] = 1.0 / max(along @ np.linalg.solve(inertia, along), 1e-300)
-        return np.maximum(found, LIGHTEST)
+                smallest[number] = 1.0 / max(along @ np.linalg.solve(inertia, along), 1e-300)
+        return np.maximum(smallest, LIGHTEST)
 
     def _turning(self, plant: Plant) -> Array:
-        """The rotors' inertia, shape (coordinates, coordinates)."""
+        """Return the rotors' inertia matrix Σ J·a·aᵀ, kg, shape (coordinates, coordinates)."""
         size = self._bodies.coordinates
-        found = np.zeros((size, size))
+        inertia = np.zeros((size, size))
         for name in self._rotors:
-            found += getattr(plant, name).inertia * np.outer(self._along[name], self._along[name])
-        return found
+            inertia += getattr(plant, name).inertia * np.outer(self._along[name], self._along[name])
+        return inertia
 
     def _bodies_of(self, plant: Plant) -> Multibody:
-        """With what is other about bodies and base."""
+        """Return the rigid bodies with the plant's inertial parameters and tilt of the base."""
+        # A change of bodies recompiles the MJCF, so the last few variants are remembered.
         key = tuple(getattr(plant, name) for name in (*self._heavy, *self._bases()))
         if key not in self._changed:
             changed = {}
@@ -221,23 +234,25 @@ class CoupledModel(Model[Plant]):
                 if list_surplus(body, *nominal).any():
                     changed[mjcf] = list_parameters(body, nominal[0], nominal[2])
             base = None if self._base is None else getattr(plant, self._base)
-            found = self._bodies
+            multibody = self._bodies
             if changed or (base is not None and any(base)):
                 turn = None if base is None else (lambda gravity: turn_gravity(base, gravity))
-                found = self._bodies.change(changed, turn)
-            self._changed = {**dict(list(self._changed.items())[-KEPT:]), key: found}
+                multibody = self._bodies.change(changed, turn)
+            self._changed = {**dict(list(self._changed.items())[-KEPT:]), key: multibody}
         return self._changed[key]
 
     def _bases(self) -> tuple[str, ...]:
         return () if self._base is None else (self._base,)
 
-    # What moves it
+    # Inputs: prescribed motion, forces, guides
 
     def _prescribe(self, plant: Plant, shifts: Mapping[str, Array]) -> Array:
-        """Positions of what is prescribed at the steps, shape (coordinates, steps + 1). shifts: of
-        measured motions, shape (ticks,)."""
+        """Return the prescribed positions at the steps, m, shape (coordinates, steps + 1).
+
+        `shifts` maps a sensor to a displacement of its measured motion, m, shape (ticks,).
+        """
         count = self._ticks * self._steps + 1
-        found = np.zeros((self._bodies.coordinates, count))
+        positions = np.zeros((self._bodies.coordinates, count))
         time = np.arange(self._ticks + 1) * self._period
         fine = np.arange(count) * (self._period / self._steps)
         for place, name in zip(self._held, self._leaders, strict=True):
@@ -249,13 +264,14 @@ class CoupledModel(Model[Plant]):
                 signal = self._read[name][0] + shifts.get(name, 0.0)
                 position = recover_motion(mover, signal, self._period)
             position = (position - self._zero[name]) / self._along[name][place]
+            # The last step needs a position beyond the last tick: extrapolated.
             position = np.append(position, 2.0 * position[-1] - position[-2])
-            found[place] = position if self._steps == 1 else interpolate(time, position, fine)
-        return found
+            positions[place] = position if self._steps == 1 else interpolate(time, position, fine)
+        return positions
 
     def _condition(self, plant: Plant, names: Sequence[str]) -> Array:
-        """Commands of actuators as conditioned, at the steps, shape (actuators, steps)."""
-        found = np.zeros((len(names), self._ticks * self._steps))
+        """Return conditioned commands of actuators at the steps, shape (actuators, steps)."""
+        commands = np.zeros((len(names), self._ticks * self._steps))
         for number, name in enumerate(names):
             command = np.ascontiguousarray(self._column(name))
             mover = getattr(plant, name)
@@ -265,25 +281,25 @@ class CoupledModel(Model[Plant]):
                 hold(conditioning, float(command[0])),
                 command,
                 self._steps,
-                found[number],
+                commands[number],
             )
-        return found
+        return commands
 
     def _push(self, plant: Plant) -> Array:
-        """Forces of the force actuators at the steps, shape (actuators, steps)."""
-        found = self._condition(plant, self._pushers)
+        """Return the forces of the force actuators at the steps, N, shape (actuators, steps)."""
+        forces = self._condition(plant, self._pushers)
         for number, name in enumerate(self._pushers):
             mover: ForceActuator = getattr(plant, name)
             limit = self._limit(plant, name)
-            found[number] = np.clip(mover.constant * found[number], -limit, limit)
-        return found
+            forces[number] = np.clip(mover.constant * forces[number], -limit, limit)
+        return forces
 
     def _limit(self, plant: Plant, name: str) -> float:
-        """Of a force actuator, N."""
+        """Return the force limit of a force actuator, N."""
         return min(getattr(plant, name).force_limit, UNLIMITED)
 
     def _serve(self, plant: Plant, commands: Array) -> Servos:
-        """The servos. commands: as conditioned, at the steps, shape (servos, steps)."""
+        """Return the servos with conditioned commands at the steps, shape (servos, steps)."""
         size, names = self._bodies.coordinates, self._servos
         laws = [push_law(getattr(plant, name)) for name in names]
         return Servos(
@@ -295,26 +311,37 @@ class CoupledModel(Model[Plant]):
         )
 
     def _inputs(self, plant: Plant, pushes: Array, commands: Array) -> StepInputs:
-        """What moves it besides measured motions: forces of the force actuators and commands of the
-        servos at the steps, shape (actuators, steps) and (servos, steps)."""
+        """Return the inputs of one test without disturbances.
+
+        `pushes` are the forces of the force actuators, N, shape (actuators, steps). `commands` are
+        the conditioned commands of the servos, m, shape (servos, steps).
+        """
         size = self._bodies.coordinates
         return StepInputs(
             prescribed=self._prescribe(plant, {}),
             pushes=pushes,
             levers=np.array([self._along[name] for name in self._pushers]).reshape(-1, size),
-            besides=np.zeros((size, self._ticks)),
-            on=np.zeros((len(self._guides), self._ticks)),
+            disturbance=np.zeros((size, self._ticks)),
+            guide_disturbance=np.zeros((len(self._guides), self._ticks)),
             servos=self._serve(plant, commands),
         )
 
     def _contacts(self, plant: Plant, forces: Array) -> Contacts:
-        """forces: of the actuators, by which a spring that nobody describes is stiff enough."""
+        """Return the guides as compiled code takes them.
+
+        `forces` are those of the force actuators, N, shape (actuators, steps). They give the load
+        by which the friction of a prescribed joint is sized.
+        """
+        # Rigid dry friction has no spring of its own. A numerical one is as stiff as the step
+        # resolves; it keeps the friction single-valued, so that a sticking joint stays put.
         guides = [getattr(plant, name) for name in self._guides]
         h = self._period / self._steps
         dry = [friction(guide) for guide in guides]
         springs = np.empty(len(guides))
         for number, (name, guide) in enumerate(zip(self._guides, guides, strict=True)):
             rigid = RIGID * self._loosest[number] / h**2
+            # A fully prescribed guide must not see its friction jump with the sensor's noise: its
+            # spring builds the friction up over the error of the measured motion.
             if not self._along[name][self._free].any():
                 load = float(np.sqrt(np.mean(forces**2))) if forces.size else 0.0
                 size = max(friction_size(dry[number], load), 1e-300)
@@ -341,25 +368,27 @@ class CoupledModel(Model[Plant]):
             rubs=np.array([friction_size(each, 1.0) > 0.0 for each in dry], bool),
         )
 
-    # Where it starts
+    # Initial state
 
     def _start_of(self, plant: Plant) -> Array:
-        """Positions and velocities, shape (2, coordinates)."""
+        """Return initial positions and velocities, m and m/s, shape (2, coordinates)."""
         if self._quick or not self._start.fitted:
             return self._start.read(plant)
         key = self._key(plant)
         if key not in self._starts:
-            found = self._start.find(plant, self._sense_from(plant))
-            self._starts = {**dict(list(self._starts.items())[-KEPT:]), key: found}
+            start = self._start.find(plant, self._sense_from(plant))
+            self._starts = {**dict(list(self._starts.items())[-KEPT:]), key: start}
         return self._starts[key]
 
     def _sense_from(self, plant: Plant) -> Sense:
-        """What is observed from any start, for so many ticks."""
-        move, besides = self._prepare(plant, {}), self._no_force()
-        return lambda start, ticks: self._sense(plant, clip_diverged(move(start, *besides, ticks)))
+        """Return a function that predicts the rows from an initial state, for some ticks."""
+        move, undisturbed = self._prepare(plant, {}), self._no_force()
+        return lambda start, ticks: self._sense(
+            plant, clip_diverged(move(start, *undisturbed, ticks))
+        )
 
     def _judge_start(self) -> None:
-        """Find out whether the error of a start as it is read shows."""
+        """Decide whether the initial state has to be fitted."""
         plant = self._configuration.plant
         rows = {
             number: (
@@ -375,10 +404,10 @@ class CoupledModel(Model[Plant]):
         measured = self._read[name][0] if name in self._read else self._column(name)
         return Seen(kind, self._along[name], self._zero[name], measured)
 
-    # How it moves
+    # Motion
 
     def _key(self, plant: Plant) -> tuple[object, ...]:
-        """What the motion depends on."""
+        """Return all components that the motion depends on, as a key of remembered motions."""
         names = {
             *self._guides,
             *self._rotors,
@@ -399,14 +428,18 @@ class CoupledModel(Model[Plant]):
     def _prepare(
         self, plant: Plant, shifts: Mapping[str, Array]
     ) -> Callable[[Array, Array, Array, int], Array]:
-        """The motion as a function of the start, of other forces on coordinates and on guides, and
-        of ticks."""
+        """Return a function that integrates the machine.
+
+        Its arguments are the initial state, shape (2, coordinates), the disturbances of coordinates
+        and guides, N, and the number of ticks.
+        """
         multibody, turning = self._bodies_of(plant), self._turning(plant)
         inputs = self._inputs(plant, self._push(plant), self._condition(plant, self._servos))
         inputs = inputs._replace(prescribed=self._prescribe(plant, shifts)) if shifts else inputs
         contacts, size = self._contacts(plant, inputs.pushes), multibody.coordinates
 
-        def move(start: Array, besides: Array, on: Array, ticks: int) -> Array:
+        def move(start: Array, disturbance: Array, guide_disturbance: Array, ticks: int) -> Array:
+            # Compiled code knows MuJoCo's data by its address only: this name keeps it alive.
             data: mujoco.MjData = multibody.data()
             bodies = multibody.bodies(data, turning)
             h = self._period / self._steps
@@ -418,7 +451,9 @@ class CoupledModel(Model[Plant]):
                 free=self._free,
                 held=self._held,
                 state=state,
-                inputs=inputs._replace(besides=besides, on=on),
+                inputs=inputs._replace(
+                    disturbance=disturbance, guide_disturbance=guide_disturbance
+                ),
                 h=h,
                 steps=self._steps,
                 first=0,
@@ -432,37 +467,40 @@ class CoupledModel(Model[Plant]):
     def move(
         self,
         plant: Plant,
-        besides: Array | None = None,
-        on: Array | None = None,
+        disturbance: Array | None = None,
+        guide_disturbance: Array | None = None,
         shifts: Mapping[str, Array] | None = None,
     ) -> Array:
-        """Positions, velocities and forces of the coordinates, shape (3, coordinates, ticks).
+        """Simulate the joints.
 
         Parameters
         ----------
         plant
-            Its components.
-        besides, on
-            Other forces on coordinates and on guides, N, shape (coordinates, ticks) and (guides,
-            ticks).
+            Components of the machine.
+        disturbance
+            Unmodelled force on each coordinate, N, shape (coordinates, ticks). Default: none.
+        guide_disturbance
+            Unmodelled force on each guide, N, shape (guides, ticks). Default: none.
         shifts
-            Of measured motions, m, shape (ticks,) each.
+            Sensor → displacement of its measured motion, m, shape (ticks,). Default: none.
 
         Returns
         -------
         array
-            The force is what moves a joint that is prescribed, and what pushes another.
+            Positions, velocities and forces of the coordinates, shape (3, coordinates, ticks). The
+            force is the one required at a prescribed coordinate, and the actuators' force at a
+            free one.
         """
-        plain = besides is None and on is None and not shifts
+        plain = disturbance is None and guide_disturbance is None and not shifts
         key = self._key(plant)
         if plain and key in self._last:
             return self._last[key]
-        nothing = self._no_force()
+        undisturbed = self._no_force()
         out = clip_diverged(
             self._prepare(plant, shifts or {})(
                 self._start_of(plant),
-                nothing[0] if besides is None else besides,
-                nothing[1] if on is None else on,
+                undisturbed[0] if disturbance is None else disturbance,
+                undisturbed[1] if guide_disturbance is None else guide_disturbance,
                 self._ticks,
             )
         )
@@ -470,15 +508,16 @@ class CoupledModel(Model[Plant]):
             self._last = {**dict(list(self._last.items())[-KEPT:]), key: out}
         return out
 
-    # What is read
+    # Sensors
 
     def observe(self, row: Row, moved: Array) -> Array:
-        """What an ideal sensor reads of a motion, as `move` has it, shape (ticks,)."""
+        """Return what an ideal sensor reads of a motion returned by `move`, shape (ticks,)."""
         along = self._along[row.name]
         if row.kind == "position":
             return along @ moved[0] + self._zero[row.name]
         if row.kind == "velocity":
             return along @ moved[1]
+        # Forces of coordinates are projected on the sensor's direction.
         return along @ moved[2] / float(along @ along)
 
     def _true(self, moved: Array) -> Array:
@@ -503,20 +542,20 @@ class CoupledModel(Model[Plant]):
         return self._start.correct(predicted) if self._quick else predicted
 
     def predict_disturbed(self, plant: Plant, entry: str, amount: Array) -> Array:
-        besides, on = self._no_force()
+        disturbance, guide_disturbance = self._no_force()
         if entry in self._guides:
-            on[self._guides.index(entry)] = amount
-            return self._sense(plant, self.move(plant, on=on))
+            guide_disturbance[self._guides.index(entry)] = amount
+            return self._sense(plant, self.move(plant, guide_disturbance=guide_disturbance))
         if entry in self._leaders:
             return self._sense(plant, self.move(plant, shifts={entry: amount}))
         if entry in self._along and entry not in {row.name for row in self.rows}:
-            besides += self._along[entry][:, None] * amount
-            return self._sense(plant, self.move(plant, besides=besides))
-        found = self.predict(plant)
-        found[[row.name for row in self.rows].index(entry)] += amount
-        return found
+            disturbance += self._along[entry][:, None] * amount
+            return self._sense(plant, self.move(plant, disturbance=disturbance))
+        predicted = self.predict(plant)
+        predicted[[row.name for row in self.rows].index(entry)] += amount
+        return predicted
 
-    # What may be wrong
+    # Disturbances
 
     def components(self) -> tuple[str, ...]:
         return (
@@ -527,13 +566,13 @@ class CoupledModel(Model[Plant]):
         )
 
     def _passage(self, component: str, plant: Plant) -> tuple[Array, Array, Array]:
-        """Position, speed and force of a component's coordinate, shape (ticks,) each."""
+        """Return position, speed and force along a component's coordinate, shape (ticks,) each."""
         moved, along = self.move(plant), self._along[component]
         if not along.any():
             along = self._along[self.rows[0].name]
         position, speed = along @ moved[0], along @ moved[1]
         if component in self._pushers:
-            # Forces of all actuators together are what pushes its joints, too.
+            # The joints' force is that of all actuators together: take this actuator's alone.
             pushed = self._push(plant)[self._pushers.index(component), :: self._steps]
             return position, speed, pushed
         if component in self._servos:
@@ -544,12 +583,12 @@ class CoupledModel(Model[Plant]):
             return position, speed, np.array(passed)
         force = along @ moved[2] / float(along @ along)
         if not force.any():
-            # It swings freely: what acts on it is what its inertia shows.
+            # No actuator acts: the force is inertia times acceleration.
             force = self._felt(along) * np.gradient(speed, self._period)
         return position, speed, force
 
     def _felt(self, along: Array) -> float:
-        """The inertia along a coordinate, kg or kg m²."""
+        """Return the inertia along a direction, kg or kg m², by the guide that has it."""
         for number, name in enumerate(self._guides):
             if np.array_equal(self._along[name], along):
                 return float(self._loosest[number])
@@ -583,7 +622,7 @@ class CoupledModel(Model[Plant]):
         return Motion(*self._passage(known, plant))
 
     def propagated_noise(self, plant: Plant) -> Array | None:
-        """What the noise of the measured motions makes of what is observed."""
+        """Return the change of the predictions by one draw of the measured motions' noise."""
         random = np.random.default_rng(SEED)
         shifts = {}
         for name in self._leaders:
@@ -598,7 +637,10 @@ class CoupledModel(Model[Plant]):
 
 
 def _average_commands(inputs: Inputs, every: int) -> Inputs:
-    """Return every n-th tick of the readings, and the means of the commands in between."""
+    """Return every n-th tick of the readings, and the means of the commands in between.
+
+    A held command acts over the whole interval, so its mean keeps the impulse on the joint.
+    """
     if every == 1:
         return inputs
     starts = np.arange(0, inputs.ticks, every)
@@ -614,43 +656,45 @@ def _average_commands(inputs: Inputs, every: int) -> Inputs:
 
 
 def _acts(guide: Guide) -> bool:
-    """Whether a guide does anything."""
+    """Return whether any parameter of a guide has an effect."""
     return any(value for name, value in guide._asdict().items() if name not in SHAPES)
 
 
 def begin(contacts: Contacts, start: Array, prescribed: Array, held: np.ndarray, h: float) -> State:
-    """The state in which a machine starts.
+    """Return the state of the machine before its first step.
 
     Parameters
     ----------
     contacts
-        What resists.
+        Guides of the machine.
     start
-        Positions and velocities, shape (2, coordinates).
-    prescribed, held
-        Positions of coordinates at the steps, and which of them are prescribed.
+        Positions and velocities, m and m/s, shape (2, coordinates).
+    prescribed
+        Prescribed positions at the steps, m, shape (coordinates, steps + 1).
+    held
+        Indices of the prescribed coordinates.
     h
-        s, of a step.
+        Integration step, s.
 
     Returns
     -------
     State
-        With all springs slack.
+        State with all friction springs slack and viscous forces settled.
     """
     place, speed = start[0].copy(), start[1].copy()
     place[held] = prescribed[held, 0]
     speed[held] = (prescribed[held, 1] - prescribed[held, 0]) / h
     along, guides = contacts.along, contacts.guides
     rate = along @ speed
-    own = along @ place + contacts.zero
+    position = along @ place + contacts.zero
     viscous, more = (Guide._fields.index(name) for name in ("viscous", "viscous_asymmetry"))
     damping = guides[:, viscous] + 0.5 * guides[:, more] * np.where(rate > 0.0, 1.0, -1.0)
     return State(
         place=place,
         speed=speed,
         before=speed.copy(),
-        slider=own.copy(),
+        slider=position.copy(),
         viscous=damping * rate,
-        inner=own.copy(),
-        within=np.zeros(len(own)),
+        inner=position.copy(),
+        within=np.zeros(len(position)),
     )

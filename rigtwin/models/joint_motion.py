@@ -1,11 +1,19 @@
-"""One joint's equation of motion: pushed by a force, or moved as prescribed. Compiled.
+"""Equation of motion of one joint, pushed by a force or with prescribed motion. Compiled.
 
-Dry friction acts through a play and a spring in series with it. Where the description gives no
-spring it is as stiff as the step allows, which holds a sticking joint where it is. Positions are
-taken at the steps, velocities midway between them. Viscous forces are those of the mean of two
-velocities, which is of second order, as a lightly damped resonance needs; where they would overcome
-the inertia within a step they become implicit. Dry friction is implicit, so it neither chatters nor
-creeps.
+    m·x'' + g(x) + k·(x − x_rest) + d(x')·x' + c_q·x'·|x'| + F_dry = F_actuator + F_disturbance
+
+with the inertia m, the gravity load g, the guide's spring k, viscous friction d (through a lag
+where the guide has a relaxation), quadratic friction c_q and dry friction F_dry.
+
+Dry friction acts through a backlash and a spring in series with it: an elastic, perfectly plastic
+element (Prandtl's). Like the bristles of the LuGre model (Canudas de Wit et al., IEEE Transactions
+on Automatic Control 40(3), 1995), it gives presliding motion. Without a described spring, it is as
+stiff as the step resolves, which holds a sticking joint in place.
+
+Numerical scheme: positions at the steps, velocities midway between them. Viscous forces act at the
+mean of two velocities, which is second order, as a lightly damped resonance needs. Where they would
+overcome the inertia within a step, they become implicit. Dry friction is implicit, so it neither
+chatters nor creeps.
 """
 
 from __future__ import annotations
@@ -27,59 +35,60 @@ from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
 
 FURTHEST = 1e12
-"""Spacings of a grid beyond which a position is none."""
+"""Largest position that is looked up in the gravity grid, in grid spacings."""
 SHORTEST = 1.0
-"""Times step² / inertia, below which a mount's compliance cannot be told from a rigid one."""
+"""Factor on step² / inertia below which the compliance of a mount counts as rigid."""
 RIGID = 1e6
-"""Times inertia / step², above which a spring cannot be told from a rigid one."""
+"""Factor on inertia / step² above which a spring counts as rigid."""
 
 
 class Inertia(NamedTuple):
-    """mass: kg or kg m². first, spacing, load: the gravity load, N or Nm, on a grid of positions;
-    rest: where the guide's spring is slack; turns: whether the grid's end is its beginning."""
+    """Inertia and gravity load of one joint.
 
-    mass: float
-    first: float
-    spacing: float
-    load: Array
-    rest: float
-    turns: bool
+    The gravity load is tabulated on a grid of positions and interpolated linearly.
+    """
+
+    mass: float  # Inertia, kg or kg m².
+    first: float  # First position of the grid, m or rad.
+    spacing: float  # Spacing of the grid, m or rad.
+    load: Array  # Gravity load on the grid, N or Nm, shape (positions,).
+    rest: float  # Position at which the guide's spring is slack, m or rad.
+    turns: bool  # Whether the joint turns round, so that the grid's end is its beginning.
 
 
 class Loop(NamedTuple):
-    """What commands the force actuator: the recording (closed 0), or a controller whose inputs are
-    recorded signals, shape (ticks, inputs), or sensors with `noise` added, of that shape too:
-    sensor[i] is −1 or the number of the sensor that input i comes from."""
+    """Source of the actuator's command: the recording, or a controller in closed loop."""
 
-    closed: bool
-    program: Program
-    registers: Array
-    memory: Array
-    recorded: Array
-    noise: Array
-    sensor: np.ndarray
+    closed: bool  # Whether the controller runs along; otherwise the command is the recorded one.
+    program: Program  # Compiled formula of the controller.
+    registers: Array  # Work space of the formula; its inputs come first.
+    memory: Array  # State of the formula (integrals, filters, delays).
+    recorded: Array  # Recorded inputs of the controller, shape (ticks, inputs).
+    noise: Array  # Noise added to simulated inputs, shape (ticks, inputs).
+    sensor: np.ndarray  # Simulated sensor of each input, or −1 for a recorded one.
 
 
 @compilable
 def gravity(inertia: Inertia, position: float) -> float:
-    """The gravity load at a position, straight between the grid's points.
+    """Return the gravity load at a position, by linear interpolation.
 
     Parameters
     ----------
     inertia
-        Of the joint.
+        Inertia and gravity grid of the joint.
     position
-        m.
+        Position, m or rad.
 
     Returns
     -------
     float
-        N.
+        Gravity load, N or Nm; that of the grid's end beyond it.
     """
     place, last = (position - inertia.first) / inertia.spacing, len(inertia.load) - 1
-    # Of what ran away there is no place.
+    # A diverged position is not reduced to one turn: it may be infinite.
     if inertia.turns and abs(place) < FURTHEST:
         place -= math.floor(place / last) * last
+    # The negated comparison also catches NaN, which would be an index out of range.
     if not place > 0.0:
         place = 0.0
     place = min(place, last - 1e-6)
@@ -98,23 +107,24 @@ def resist(
     motion: Array,
     out: Array,
 ) -> None:
-    """Adds a guide's forces to the load that it transmits.
+    """Add a guide's forces to the load that it transmits, for a prescribed motion.
 
     Parameters
     ----------
     guide, dry_friction
-        What resists the motion.
+        Guide that resists the motion, and its dry friction.
     spring
-        In series with the dry friction, N/m.
+        Stiffness in series with the dry friction, N/m.
     rest
-        Where the guide's own spring is slack, m.
+        Position at which the guide's own spring is slack, m.
     period
-        s, of a tick.
+        Time from tick to tick, s.
     motion
-        Position m, velocity m/s, acceleration m/s², shape (3, ticks).
+        Position, velocity and acceleration, m, m/s and m/s², shape (3, ticks).
     out
-        The load, N, shape (ticks,); the whole force is written here.
+        Transmitted load, N, shape (ticks,); overwritten with the whole force.
     """
+    # At the start the friction spring is slack, as after a long rest.
     slider, viscous = motion[0, 0], 0.0
     share = period / (guide.relaxation + period)
     if guide.mount_compliance > 0.0:
@@ -140,6 +150,7 @@ def resist(
         return
     for tick in range(motion.shape[1]):
         x, v = motion[0, tick], motion[1, tick]
+        # Load-dependent friction sees inertia, gravity and spring, but not friction itself.
         transmitted = out[tick] + position_force(guide, x, rest)
         forward, backward = dry_limits(dry_friction, v, transmitted)
         dry, by = slide(x - slider, 0.5 * guide.backlash, spring, forward, backward)
@@ -152,21 +163,22 @@ def resist(
 def resist_at_once(
     guide: Guide, dry_friction: Friction, rest: float, period: float, motion: Array, out: Array
 ) -> None:
-    """The same of a guide without play and springs before its friction, whose speed is known: dry
-    friction reverses in the very tick in which the speed does.
+    """Add a guide's forces to its load where dry friction has neither backlash nor spring.
+
+    The velocity is known, so dry friction follows its sign and reverses in the same tick.
 
     Parameters
     ----------
     guide, dry_friction
-        What resists the motion.
+        Guide that resists the motion, and its dry friction.
     rest
-        Where the guide's own spring is slack, m.
+        Position at which the guide's own spring is slack, m.
     period
-        s, of a tick.
+        Time from tick to tick, s.
     motion
-        Position m, velocity m/s, acceleration m/s², shape (3, ticks).
+        Position, velocity and acceleration, m, m/s and m/s², shape (3, ticks).
     out
-        The load, N, shape (ticks,); the whole force is written here.
+        Transmitted load, N, shape (ticks,); overwritten with the whole force.
     """
     viscous, share = 0.0, period / (guide.relaxation + period)
     for tick in range(motion.shape[1]):
@@ -188,20 +200,20 @@ def inverse_dynamics(
     motion: Array,
     out: Array,
 ) -> None:
-    """The force that moves the joint as prescribed.
+    """Compute the force that moves the joint as prescribed: m·x'' + g(x) + guide's forces.
 
     Parameters
     ----------
     guide, dry_friction, inertia
-        What moves.
+        Guide with its dry friction, and inertia of the joint.
     spring
-        In series with the dry friction, N/m.
+        Stiffness in series with the dry friction, N/m.
     period
-        s, of a tick.
+        Time from tick to tick, s.
     motion
-        Position m, velocity m/s, acceleration m/s², shape (3, ticks).
+        Position, velocity and acceleration, m, m/s and m/s², shape (3, ticks).
     out
-        The force is written here, N, shape (ticks,).
+        Force, written, N, shape (ticks,).
     """
     for tick in range(motion.shape[1]):
         x, a = motion[0, tick], motion[2, tick]
@@ -232,64 +244,73 @@ def integrate_pushed(
     kinds: np.ndarray,
     loop: Loop,
     command: Array,
-    besides: Array,
+    disturbance: Array,
     period: float,
     steps: int,
     out: Array,
 ) -> None:
-    """The joint under its force actuator or servo.
+    """Integrate the joint under its force actuator or servo.
 
     Parameters
     ----------
     guide, dry_friction, inertia
-        What moves.
+        Guide with its dry friction, and inertia of the joint.
     spring
-        In series with the dry friction, N/m.
+        Stiffness in series with the dry friction, N/m.
     start
-        Position m and velocity m/s.
+        Initial position and velocity, m and m/s.
     law
-        Of what pushes it.
+        Law of the force actuator or servo.
     drive, held
-        Conditioning of its command, and its state.
-    sensors, states, kinds
-        That the controller reads; kind 0 of position, 1 of velocity.
+        Conditioning of its command, and the state of that.
+    sensors, states
+        Sensors that the controller reads, and their states.
+    kinds
+        Measured quantity of each sensor: 0 position, 1 velocity.
     loop
-        What commands the actuator.
+        Source of the command.
     command
-        As recorded, shape (ticks,); replaced by the controller's if the loop is closed.
-    besides
-        Another force, N, shape (ticks,).
+        Recorded command, shape (ticks,); overwritten by the controller in closed loop.
+    disturbance
+        Unmodelled force on the joint, N, shape (ticks,).
     period
-        s, of a tick.
+        Time from tick to tick, s.
     steps
-        Of integration a tick.
+        Integration steps per tick.
     out
-        Position, velocity and the actuator's force are written here, shape (3, ticks).
+        Position, velocity and actuator force, written, shape (3, ticks).
     """
+    # One kernel on purpose: parts of their own would pass and return a dozen scalars of state in
+    # every step.
     h = period / steps
     x, v = start
     slider, viscous, force = x, damping(guide, v) * v, 0.0
+    # A servo's conditioned command is a position, a force actuator's a force.
     follows, wanted, held_by = law.position_gain > 0.0, held.memory[3], 0.0
     half = 0.5 * guide.backlash
     neutral = np.array([sensor.neutral for sensor in sensors])
     share = h / (guide.relaxation + h)
     yields = guide.mount_compliance * inertia.mass > SHORTEST * h * h
     inner, speed = x, 0.0
-    # Taken out of their tuple here: in the loop it costs more than a step.
+    # Reading a tuple's fields inside the loop costs more than a step.
     sensor, recorded, noise = loop.sensor, loop.recorded, loop.noise
     operations, registers, memory = loop.program.operations, loop.registers, loop.memory
     for tick in range(len(command)):
+        # Sensors read before the tick's command acts.
         out[0, tick], out[1, tick] = x, v
         out[2, tick] = push(law, wanted, x, v) if follows else force
         if loop.closed:
             for number in range(len(sensor)):
-                which = sensor[number]
+                source = sensor[number]
                 registers[number] = recorded[tick, number]
-                if which >= 0:
-                    true = x if kinds[which] == 0 else v
-                    # To take a sensor out of the tuple costs more than the rest of a tick.
+                if source >= 0:
+                    true = x if kinds[source] == 0 else v
+                    # A neutral sensor is skipped: reading it from the tuple costs more than the
+                    # rest of a tick.
                     sensed = (
-                        true if neutral[which] else transduce(sensors[which], states[which], true)
+                        true
+                        if neutral[source]
+                        else transduce(sensors[source], states[source], true)
                     )
                     registers[number] = sensed + noise[tick, number]
             command[tick] = run(operations, registers, memory, period)
@@ -298,7 +319,7 @@ def integrate_pushed(
                 before, wanted = wanted, condition(drive, held, command[tick])
                 pushed, held_by = pull(law, 0.5 * (before + wanted), x), law.damping_gain
                 if abs(pushed - held_by * v) > law.limit:
-                    # At its limit a servo damps nothing.
+                    # A saturated servo has a constant force, so it damps nothing.
                     pushed, held_by = math.copysign(law.limit, pushed - held_by * v), 0.0
             else:
                 earlier = force
@@ -320,29 +341,32 @@ def integrate_pushed(
                     outer=x,
                 )
                 speed, inner = (place - inner) / h, place
-                load = pushed + besides[tick] - gravity(inertia, x) - held_back
+                load = pushed + disturbance[tick] - gravity(inertia, x) - held_back
                 v = (v + h * load / inertia.mass) / (1.0 + h * held_by / inertia.mass)
                 x += h * v
                 continue
             coefficient = damping(guide, v)
-            # About this position half a step passes under the old force and half under the new one.
+            # The velocity step is centred on this position: half of it passes under the old
+            # command and half under the new one, which is why `pushed` is their mean.
             load = (
                 pushed
-                + besides[tick]
+                + disturbance[tick]
                 - gravity(inertia, x)
                 - position_force(guide, x, inertia.rest)
                 - (1.0 - share) * viscous
             )
             damped = h * (share * coefficient + guide.drag * abs(v) + held_by)
-            # Above ½ only there; a division that is not needed delays the step.
+            # Implicit share of the damping: the midpoint rule's ½ until d·h = 2m, where it would
+            # start to oscillate, and more beyond.
             ahead = 1.0 - inertia.mass / damped if damped > 2.0 * inertia.mass else 0.5
             total = inertia.mass + ahead * damped
             rhs = (inertia.mass - (1.0 - ahead) * damped) * v + h * load
             forward, backward = dry_limits(dry_friction, v, pushed)
+            # Without dry friction; then with a stretched spring; then with a slider that slides.
             velocity = rhs / total
-            apart = x + h * velocity - slider
-            if apart > half or apart < -half:
-                edge = math.copysign(half, apart)
+            stretch_length = x + h * velocity - slider
+            if stretch_length > half or stretch_length < -half:
+                edge = math.copysign(half, stretch_length)
                 velocity = (rhs - h * spring * (x - slider - edge)) / (total + h * h * spring)
                 dry, by = slide(x + h * velocity - slider, half, spring, forward, backward)
                 if by != 0.0:

@@ -13,8 +13,8 @@ from rigtwin.components.guide import dry_limits, friction, slide
 from rigtwin.description.catalogue import find
 from rigtwin.description.machine import Machine
 from rigtwin.models.following import follow_command
-from rigtwin.models.guided import Inertia, inverse_dynamics
 from rigtwin.models.joint import JointModel
+from rigtwin.models.joint_motion import Inertia, inverse_dynamics
 from rigtwin.recording import Recording
 from rigtwin.signals.noise import smooth
 from tests.helpers.described import described, recording_of
@@ -72,7 +72,7 @@ def test_friction_differs_by_direction_and_near_standstill():
     assert dry_limits(greater_at_rest, 1.0, 0.0)[0] == pytest.approx(20.0)
 
 
-def test_a_spring_and_a_play_in_series_with_friction():
+def test_friction_acts_through_its_spring_and_backlash():
     """After a reversal: the spring lets go over 2·F/k with the play between, then the slider slides
     again."""
     fall = np.concatenate([np.linspace(0.0, 0.02, 1000), np.linspace(0.02, 0.0, 1000)])
@@ -87,7 +87,7 @@ def test_a_spring_and_a_play_in_series_with_friction():
     np.testing.assert_allclose(force[1000:], expected, atol=1e-6)
 
 
-def test_a_slider_slides_no_further_than_it_must():
+def test_a_friction_element_slips_only_down_to_its_limit():
     force, by = slide(0.005, 0.001, 1e4, 20.0, 30.0)
     assert (force, by) == (20.0, pytest.approx(0.002))
     assert slide(-0.0035, 0.001, 1e4, 20.0, 30.0) == (-25.0, 0.0)
@@ -125,7 +125,7 @@ def test_a_mount_stretches_before_dry_friction_slips():
     np.testing.assert_allclose(force[1000:], np.maximum(slipping - 1e4 * back, low), atol=0.02)
 
 
-def test_a_mass_pushed_against_a_stuck_guide_swings_on_its_mount(tmp_path):
+def test_a_mass_on_a_stuck_guide_oscillates_on_its_mount(tmp_path):
     """ω² = 1/(c·m), without numerical damping."""
     machine = described(tmp_path, "slide")
     pushed = {"/command": {"force": np.full(3000, 5.0)}, "/sensor": {"position": np.zeros(3000)}}
@@ -177,7 +177,7 @@ def test_an_actuator_has_its_frequency_response(values, transfer):
         assert abs(found - transfer(1j * w) * np.exp(-0.5j * w * PERIOD)) < 1e-3
 
 
-def test_a_play_is_its_width():
+def test_backlash_of_a_position_actuator_has_its_width():
     command = 0.01 * np.sin(2 * np.pi * TIME)
     position = follow_command(PositionActuator(deadband=0.002), command, 0.0, PERIOD, 1)
     assert np.max(position[1000:]) == pytest.approx(0.008, abs=1e-5)

@@ -16,7 +16,7 @@ from rigtwin.description.document import examine, load
 from rigtwin.diagnosis.diagnose import diagnose
 from rigtwin.errors import RigtwinError
 from rigtwin.joints.parts import parts
-from rigtwin.models.moved import MovedModel
+from rigtwin.models.inverse_dynamics import InverseDynamicsModel
 from tests.helpers.arm import (
     BELT,
     COUPLED,
@@ -69,7 +69,7 @@ CHANGES = [
     CHANGES,
     ids=[f"{c}-{list(v)}" for c, v, _, _ in CHANGES],
 )
-def test_a_friction_acts_where_it_is(tmp_path, moved, component, values, onto, force):
+def test_friction_acts_on_its_own_coordinate(tmp_path, moved, component, values, onto, force):
     machine = described_arm(tmp_path, (TOML + COUPLED).replace("band = 25.0", ""))
     data = recording(moved[0], torques(*moved), (0.0, 0.0))
     plant = machine.configuration_of(data).plant
@@ -137,18 +137,18 @@ def test_noise_of_measured_angles_is_carried_into_the_torques(tmp_path, moved):
         assert 0.5 < said / is_so < 2.0
 
 
-def test_where_a_joint_rests_its_torque_says_nothing(tmp_path, moved):
+def test_torques_of_a_resting_joint_are_undetermined(tmp_path, moved):
     position, *_ = moved
     still = position.copy()
     still[1, 2000:] = still[1, 2000]
     machine = described_arm(tmp_path)
     data = recording(still, torques(*moved), (0.0, 0.0))
-    found = MovedModel(machine, machine.replays[0], data.inputs).undetermined()
+    found = InverseDynamicsModel(machine, machine.replays[0], data.inputs).undetermined()
     assert found[1, 2100:-200].all()
     assert not found[0, 2100:-200].all()
 
 
-def test_what_shares_nothing_is_searched_apart(tmp_path):
+def test_independent_joints_are_searched_separately(tmp_path):
     alone = parts(described_arm(tmp_path))
     assert [[row.name for row in part.rows] for part in alone] == [["torque_1"], ["torque_2"]]
     assert {effect.group for effect in alone[0].effects()} == {"shoulder"}
@@ -176,14 +176,14 @@ MISTAKES = [
 
 
 @pytest.mark.parametrize(("right", "wrong", "said"), MISTAKES, ids=[m[2] for m in MISTAKES])
-def test_a_mistake_is_said_in_one_line(tmp_path, right, wrong, said):
+def test_a_mistake_is_reported_in_one_line(tmp_path, right, wrong, said):
     assert right in TOML
     with pytest.raises(RigtwinError, match=said) as caught:
         described_arm(tmp_path, TOML.replace(right, wrong))
     assert "\n" not in str(caught.value)
 
 
-def test_what_of_the_model_is_not_taken_into_account_is_said(tmp_path):
+def test_ignored_parts_of_the_model_are_reported(tmp_path):
     machine = described_arm(tmp_path)
     assert machine.overlooked == ("tendon belt: it is no component",)
     text = (tmp_path / "arm.xml").read_text()
@@ -210,7 +210,7 @@ def test_friction_of_joints_and_of_a_coupling_is_found(tmp_path):
     assert values["coulomb@belt"] == pytest.approx(0.8, rel=0.05)
 
 
-def test_an_arm_that_is_as_described_has_no_gap(tmp_path):
+def test_an_arm_as_described_has_no_gap(tmp_path):
     machine = described_arm(tmp_path)
     moved = motion(10.0)
     found = diagnose(machine, [recording(moved[0], torques(*moved), (2e-5, 0.05))])
@@ -218,7 +218,7 @@ def test_an_arm_that_is_as_described_has_no_gap(tmp_path):
     assert not found.effects
 
 
-def test_joints_that_share_nothing_are_one_answer(tmp_path):
+def test_independent_joints_give_one_answer(tmp_path):
     machine = described_arm(tmp_path)
     moved = motion(10.0)
     torque = torques(*moved)
@@ -251,7 +251,7 @@ angle_2 = "0.7 * sin(3 * time)"
 """
 
 
-def test_the_twin_reads_what_its_motion_takes(tmp_path):
+def test_the_twin_reads_the_force_that_its_motion_requires(tmp_path):
     machine = described_arm(tmp_path, TOML + COUPLED + EXPERIMENT)
     done = run(machine, "swing", effects={"viscous@belt": 0.5})
     time = done.time

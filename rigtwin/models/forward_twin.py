@@ -1,4 +1,4 @@
-"""The twin of joints some of which are free: what their sensors read in a test."""
+"""Twin of joints of which some are free: sensor readings of a test, by forward dynamics."""
 
 from __future__ import annotations
 
@@ -15,38 +15,45 @@ from rigtwin.components.servo import push_law
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Machine, ReplayOf, Row
 from rigtwin.models.commanding import Command, Readings, commands_of
-from rigtwin.models.coupled import CoupledModel, begin
 from rigtwin.models.demands import list_pushers, list_sensors
+from rigtwin.models.forward_dynamics import ForwardDynamicsModel, begin
 from rigtwin.models.inputs import inputs_of_test
-from rigtwin.models.moved_twin import Moved
+from rigtwin.models.inverse_twin import SimulatedSignals
 from rigtwin.models.multibody import Multibody
 from rigtwin.models.stepped_twin import Drive, Sensing, SteppedTwin
 from rigtwin.numerics.arrays import Array, has_diverged
 
 
-class CoupledTwin(CoupledModel):
-    """All joints in a test to come, advanced tick by tick under a controller."""
+class ForwardDynamicsTwin(ForwardDynamicsModel):
+    """Forward-dynamics model of a test that is still to be run."""
 
     def _bodies_of(self, plant: Plant) -> Multibody:
-        """With the mass of joints that are described one by one."""
-        found, shares = super()._bodies_of(plant), dict[str, float]()
+        """Return the rigid bodies, with the masses of joints that are described one by one."""
+        multibody, shares = super()._bodies_of(plant), dict[str, float]()
         for replay in self._machine.replays:
-            own = replay.joint.inertia - replay.joint.armature
-            if replay.mass is not None and own > 0.0:
-                shares[replay.joint.name] = getattr(plant, replay.mass).mass / own
-        return found.scale(shares) if any(share != 1.0 for share in shares.values()) else found
+            nominal_mass = replay.joint.inertia - replay.joint.armature
+            if replay.mass is not None and nominal_mass > 0.0:
+                shares[replay.joint.name] = getattr(plant, replay.mass).mass / nominal_mass
+        return (
+            multibody.scale(shares) if any(share != 1.0 for share in shares.values()) else multibody
+        )
 
     def begin(self, plant: Plant, outputs: Sequence[str], sensors: Sequence[Row]) -> SteppedTwin:
-        """The machine at the beginning of its test.
+        """Return the machine at the beginning of its test.
 
         Parameters
         ----------
         plant
-            Its components.
+            Components of the machine.
         outputs
-            Force actuators and servos that are commanded tick by tick.
+            Names of the force actuators and servos that are commanded tick by tick.
         sensors
-            That are read tick by tick.
+            Sensors that are read tick by tick.
+
+        Returns
+        -------
+        SteppedTwin
+            Twin that advances one tick at a time.
         """
         h = self._period / self._steps
         multibody = self._bodies_of(plant)
@@ -68,7 +75,7 @@ class CoupledTwin(CoupledModel):
             steps=self._steps,
         )
 
-    def move_commanded(
+    def simulate_controlled(
         self,
         plant: Plant,
         outputs: Sequence[str],
@@ -76,32 +83,32 @@ class CoupledTwin(CoupledModel):
         readings: Readings,
         sensors: Sequence[Row],
     ) -> tuple[Array, Array]:
-        """The motion and the commands.
+        """Simulate the test with a controller in the loop.
 
         Parameters
         ----------
         plant, outputs
-            As of `begin`.
+            Components and commanded actuators, as in `begin`.
         command
-            Of a tick, by what was read.
+            Controller: tick and readings → command.
         readings, sensors
-            What the controller reads.
+            Sensors that the controller reads, and their imperfections.
 
         Returns
         -------
         tuple
-            Positions, velocities and forces, shape (3, coordinates, ticks), as `move` has them;
-            commands, shape (outputs, ticks).
+            Positions, velocities and forces, shape (3, coordinates, ticks), as returned by `move`,
+            and the commands, shape (outputs, ticks).
         """
         stepped = self.begin(plant, outputs, sensors)
         fields = [self._field(name) for name in outputs]
         out = np.zeros((3, self._bodies.coordinates, self._ticks))
-        given = np.zeros((len(outputs), self._ticks))
+        commands = np.zeros((len(outputs), self._ticks))
         for tick in range(self._ticks):
             read = readings.take(tick, stepped.sense())
-            given[:, tick] = told = commands_of(command(tick, read), fields)
-            out[:, :, tick] = stepped.step(told)
-        return out, given
+            commands[:, tick] = command_values = commands_of(command(tick, read), fields)
+            out[:, :, tick] = stepped.step(command_values)
+        return out, commands
 
     def _drive(self, plant: Plant, name: str, h: float) -> Drive:
         mover: ForceActuator | Servo = getattr(plant, name)
@@ -112,7 +119,7 @@ class CoupledTwin(CoupledModel):
         return Drive(model, mover.constant, limit, False, self._pushers.index(name))
 
     def list_sensors(self, plant: Plant) -> list[Row]:
-        """The sensors of its joints, each with what it reads."""
+        """Return the sensors of the joints and the quantity that each reads."""
         return [
             Row(name, kind, component.channel, component.unit)
             for name, component in self._machine.components.items()
@@ -128,8 +135,11 @@ class CoupledTwin(CoupledModel):
 
 
 def list_parts(machine: Machine) -> list[ReplayOf]:
-    """What of a machine goes together in its twin: all joints that are pushed, free ones with them,
-    and each that is prescribed and acts on no other."""
+    """Return the parts of a machine that its twin simulates one by one.
+
+    All joints pushed by actuators form one part, together with free joints. Each joint with
+    prescribed motion that acts on no other is a part of its own.
+    """
     pushers = list_pushers(machine)
     alone = [replay for replay in machine.replays if not replay.free]
     pushed = [replay for replay in alone if set(replay.moved_by) <= set(pushers)]
@@ -151,56 +161,63 @@ def list_parts(machine: Machine) -> list[ReplayOf]:
 def begin_live(
     machine: Machine, configuration: Configuration, outputs: Sequence[str], sensors: Sequence[Row]
 ) -> SteppedTwin:
-    """A machine whose joints are all pushed, before a test of any length.
+    """Return the twin of a machine whose joints are all pushed, before a test of any length.
 
     Parameters
     ----------
     machine
-        Its description.
+        Description of the machine.
     configuration
-        With the effects that it has.
+        Settings of the test, with the effects applied.
     outputs, sensors
-        All its actuators, and the sensors that are read.
-    """
-    (replay,) = list_parts(machine)
-    nothing: dict[str, Array] = {name: np.zeros(2) for name in outputs}
-    twin, _ = _at_start(machine, replay, configuration, nothing)
-    return twin.begin(configuration.plant, outputs, sensors)
-
-
-def move_freely(
-    machine: Machine, replay: ReplayOf, configuration: Configuration, demands: dict[str, Array]
-) -> Moved:
-    """What the sensors read, noise and bits apart.
-
-    Parameters
-    ----------
-    machine
-        Its description.
-    replay
-        Which of its joints.
-    configuration
-        With the effects that it has.
-    demands
-        Component → the command of an actuator, or where a joint goes that a sensor prescribes,
-        shape (ticks,).
+        Names of all its actuators, and the sensors that are read.
 
     Returns
     -------
-    Moved
-        What all its sensors read.
+    SteppedTwin
+        Twin that advances one tick at a time.
+    """
+    (replay,) = list_parts(machine)
+    # Two ticks are enough: a stepped twin looks at no input beyond the current tick.
+    no_demands: dict[str, Array] = {name: np.zeros(2) for name in outputs}
+    twin, _ = _at_start(machine, replay, configuration, no_demands)
+    return twin.begin(configuration.plant, outputs, sensors)
+
+
+def simulate_forward(
+    machine: Machine, replay: ReplayOf, configuration: Configuration, demands: dict[str, Array]
+) -> SimulatedSignals:
+    """Simulate a test whose commands are all known beforehand.
+
+    Parameters
+    ----------
+    machine
+        Description of the machine.
+    replay
+        Part of the machine, by `list_parts`.
+    configuration
+        Settings of the test, with the effects applied.
+    demands
+        Component → command of an actuator, or position of a joint whose sensor prescribes its
+        motion, shape (ticks,).
+
+    Returns
+    -------
+    SimulatedSignals
+        Readings of all sensors of this part, without noise and quantisation.
     """
     plant, period = configuration.plant, configuration.timing.period
-    model, found = _at_start(machine, replay, configuration, demands)
+    model, readings = _at_start(machine, replay, configuration, demands)
     moved = model.move(plant)
     for row in model.list_sensors(plant):
-        if row.name not in found:
+        # Sensors that prescribe motion read their demand, which is in `readings` already.
+        if row.name not in readings:
             true = model.observe(row, moved)
-            found[row.name] = apply_sensor(getattr(plant, row.name), true, period)
-    return Moved(found, not has_diverged(moved))
+            readings[row.name] = apply_sensor(getattr(plant, row.name), true, period)
+    return SimulatedSignals(readings, not has_diverged(moved))
 
 
-def move_commanded(
+def simulate_controlled(
     machine: Machine,
     replay: ReplayOf,
     configuration: Configuration,
@@ -209,54 +226,57 @@ def move_commanded(
     command: Command,
     noise: Mapping[str, Array],
     ticks: int,
-) -> Moved:
-    """What the sensors read and what a controller commanded, noise and bits apart of what it does
-    not read.
+) -> SimulatedSignals:
+    """Simulate a test with a controller in the loop.
 
     Parameters
     ----------
     machine, replay, configuration, demands
-        As of `move_freely`.
+        Machine and test, as in `simulate_forward`.
     outputs
-        Actuators that the controller commands.
+        Names of the actuators that the controller commands.
     command
-        The controller.
+        Controller: tick and readings → command.
     noise
-        Sensor → what is added to its reading, shape (ticks,).
+        Sensor → noise added to its reading, shape (ticks,).
     ticks
-        Of the test.
+        Number of ticks of the test.
 
     Returns
     -------
-    Moved
-        Readings of all its sensors, and the commands of `outputs`.
+    SimulatedSignals
+        Readings of all sensors, and the commands of `outputs`. Readings of the controller have
+        noise and quantisation; the others have neither.
     """
     plant, period = configuration.plant, configuration.timing.period
-    nothing = {name: np.zeros(ticks) for name in outputs}
-    model, found = _at_start(machine, replay, configuration, {**nothing, **demands})
+    no_commands = {name: np.zeros(ticks) for name in outputs}
+    model, prescribed = _at_start(machine, replay, configuration, {**no_commands, **demands})
     sensors, readable = model.list_sensors(plant), list_sensors(machine)
     read = [row for row in sensors if row.name in readable]
     readings = Readings(plant, [row.name for row in read], noise, period, ticks)
-    moved, given = model.move_commanded(plant, outputs, command, readings, read)
+    moved, commands = model.simulate_controlled(plant, outputs, command, readings, read)
+    unread = dict(prescribed)
     for row in sensors:
         if row.name not in readings.signals:
             true = model.observe(row, moved)
-            found[row.name] = apply_sensor(getattr(plant, row.name), true, period)
-    signals = {**found, **readings.signals, **dict(zip(outputs, given, strict=True))}
-    return Moved(signals, not has_diverged(moved), frozenset({*readings.signals, *outputs}))
+            unread[row.name] = apply_sensor(getattr(plant, row.name), true, period)
+    signals = {**unread, **readings.signals, **dict(zip(outputs, commands, strict=True))}
+    return SimulatedSignals(
+        signals, not has_diverged(moved), frozenset({*readings.signals, *outputs})
+    )
 
 
 def _at_start(
     machine: Machine, replay: ReplayOf, configuration: Configuration, demands: dict[str, Array]
-) -> tuple[CoupledTwin, dict[str, Array]]:
-    """The machine before its test, and what the sensors read that prescribe motions."""
+) -> tuple[ForwardDynamicsTwin, dict[str, Array]]:
+    """Return the model before its test, and the readings of sensors that prescribe motion."""
     plant, period = configuration.plant, configuration.timing.period
-    found = {
+    prescribed = {
         name: apply_sensor(getattr(plant, name), demand, period)
         for name, demand in demands.items()
         if measures(getattr(plant, name))
     }
-    inputs = inputs_of_test(machine, {**demands, **found}, period)
+    inputs = inputs_of_test(machine, {**demands, **prescribed}, period)
     unobserved = replace(replay, rows=())
     steps = configuration.substeps
-    return CoupledTwin(machine, unobserved, inputs, configuration, steps), found
+    return ForwardDynamicsTwin(machine, unobserved, inputs, configuration, steps), prescribed
