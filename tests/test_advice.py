@@ -68,7 +68,9 @@ def test_without_a_gap_nothing_is_corrected_but_what_was_not_seen_is_said():
 
 def test_what_fits_alike_is_told_apart_by_the_test_that_does_it():
     alike = finding("guide", "compliance", 0.5, "mount")
-    (hint,) = [s for s in advise(answer("explained", effects=(alike,))) if "cannot distinguish" in s]
+    (hint,) = [
+        s for s in advise(answer("explained", effects=(alike,))) if "cannot distinguish" in s
+    ]
     assert "compliance@guide from mount@guide" in hint
     test = NextTest("sweep", "rigtwin run any sweep", 20.0, ("compliance@guide", "mount@guide"))
     said = advise(answer("explained", effects=(alike,), next_test=test))

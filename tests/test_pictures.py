@@ -160,9 +160,7 @@ def test_what_the_commands_alone_say_is_not_promised_to_move_a_line():
 
 
 def test_a_picture_says_how_much_of_the_effect_its_recording_asks_for():
-    assert shown("gain@load_cell", gain=1.1).caption.endswith(
-        "the effect has the fitted size."
-    )
+    assert shown("gain@load_cell", gain=1.1).caption.endswith("the effect has the fitted size.")
     evidence = evidence_of(recorded("imposed", GAIN, 3.5))
     twice = RIG.plant._replace(load_cell=RIG.plant.load_cell._replace(gain=1.15))
     found = picture(evidence, twice, finding_of("gain@load_cell", gain=1.15))

@@ -8,6 +8,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -64,8 +65,7 @@ def find_changes(
     if len(recordings) < 2:
         raise RigtwinError("what changed: expected at least two recordings, got one")
 
-    def diagnose_set(of: Sequence[Recording]) -> Diagnosis:
-        return diagnose(machine, of, base, progress=progress, thresholds=thresholds)
+    diagnose_set = partial(diagnose, machine, base=base, progress=progress, thresholds=thresholds)
 
     # BLAS threads would compete with the threads of the search.
     with threadpool_limits(1):
@@ -77,6 +77,7 @@ def find_changes(
         if has_change or search.together.verdict not in ("no gap", "explained"):
             model = _restart(model, search, (aligned[0], aligned[-1]), diagnose_set, thresholds)
     covariates = _covariates(search.evidence)
+    # Trends are fitted last: they describe a change, and do not decide whether there is one.
     parameters = tuple(
         _with_trends(parameter, covariates, thresholds) for parameter in model.parameters
     )

@@ -215,14 +215,10 @@ def diagnose(
         unusable = _answer_unusable(machine, recordings, configurations, started)
         if unusable is not None:
             return Diagnosis(unusable, machine, None, configurations[0])
-        held_out_configurations = [
-            machine.configuration_of(recording, base) for recording in held_out
-        ]
-        for recording, configuration in zip(held_out, held_out_configurations, strict=True):
-            require_fit(machine, recording, configuration, least_ticks(held_out))
+        judging_configurations = _configure_held_out(machine, held_out, base)
 
         def evidence_of(part: Machine) -> tuple[Evidence, Evidence | None]:
-            judging = Evidence(part, held_out, held_out_configurations) if held_out else None
+            judging = Evidence(part, held_out, judging_configurations) if held_out else None
             return Evidence(part, recordings, configurations), judging
 
         # Joints that do not act on each other are diagnosed one by one: their effects cannot be
@@ -234,6 +230,16 @@ def diagnose(
         if len(parts) == 1:
             return _with_notes(parts[0], notes)
         return _with_notes(join(*evidence_of(machine), parts, started), notes)
+
+
+def _configure_held_out(
+    machine: Machine, held_out: Sequence[Recording], base: Configuration | None
+) -> list[Configuration]:
+    """Settings of the held-out recordings; raises where one of them cannot be compared."""
+    configurations = [machine.configuration_of(recording, base) for recording in held_out]
+    for recording, configuration in zip(held_out, configurations, strict=True):
+        require_fit(machine, recording, configuration, least_ticks(held_out))
+    return configurations
 
 
 def _with_notes(diagnosis: Diagnosis, notes: Sequence[str]) -> Diagnosis:

@@ -169,56 +169,71 @@ def html(diagnosis: Diagnosis) -> str:
     str
         Page with styles, scripts and data inside.
     """
-    environment = Environment(
-        loader=PackageLoader("rigtwin.diagnosis"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters["code"] = _code
     # Bokeh takes a second to import, and a diagnosis without a report does not need it.
     from rigtwin.diagnosis import figures
 
     answer = diagnosis.answer
     overlays = diagnosis.overlays()
     corrected = bool(answer.effects)
-    step_units = {
-        name: shorten(unit, *(step.residual[name] for step in answer.steps))
-        for name, unit in answer.units.items()
-    }
     drawings = figures.draw(diagnosis.pictures(), overlays, corrected)
+    # The drawing of the machine marks the components of effects and of located residuals.
     guilty = {effect.name.component for effect in answer.effects} | {
         place.component for place in answer.where
     }
-    return environment.get_template("report.html").render(
-        diagnosis=answer,
-        guilty=guilty,
-        bars=bars(answer),
-        drawings=drawings,
-        overlays=overlays,
-        corrected=corrected,
-        advice=advise(answer),
-        title_of=title_of,
-        meaning_of=meaning_of,
-        share_of=share_of,
-        headlines=headlines(overlays, corrected),
-        tested=list(dict.fromkeys(each.recording for each in overlays if each.held_out)),
-        confidence=CONFIDENCE,
-        weight="weight among those tried",
-        spell=spell,
-        sensor_units=_sensor_units(overlays),
-        step_units=step_units,
-        against_nominal=against_nominal,
-        write=write_size,
-        recordings=[Path(name).name for name in answer.recordings],
-        title=diagnosis.described.title,
-        components=list(diagnosis.evidence.machine.components)
-        if diagnosis.evidence is not None
-        else [],
-        tried=len(candidates(diagnosis.evidence)) if diagnosis.evidence is not None else 0,
-        version=__version__,
+    return (
+        _environment()
+        .get_template("report.html")
+        .render(
+            diagnosis=answer,
+            guilty=guilty,
+            bars=bars(answer),
+            drawings=drawings,
+            overlays=overlays,
+            corrected=corrected,
+            advice=advise(answer),
+            title_of=title_of,
+            meaning_of=meaning_of,
+            share_of=share_of,
+            headlines=headlines(overlays, corrected),
+            tested=list(dict.fromkeys(each.recording for each in overlays if each.held_out)),
+            confidence=CONFIDENCE,
+            weight="weight among those tried",
+            spell=spell,
+            sensor_units=_sensor_units(overlays),
+            step_units=_step_units(answer),
+            against_nominal=against_nominal,
+            write=write_size,
+            recordings=[Path(name).name for name in answer.recordings],
+            title=diagnosis.described.title,
+            components=list(diagnosis.evidence.machine.components)
+            if diagnosis.evidence is not None
+            else [],
+            tried=len(candidates(diagnosis.evidence)) if diagnosis.evidence is not None else 0,
+            version=__version__,
+        )
     )
+
+
+def _environment() -> Environment:
+    """Environment of the template; a misspelt variable raises rather than leaving a gap."""
+    environment = Environment(
+        loader=PackageLoader("rigtwin.diagnosis"),
+        # Names of files and channels come from outside and could otherwise write HTML.
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters["code"] = _code
+    return environment
+
+
+def _step_units(answer: Answer) -> dict[str, tuple[float, str]]:
+    """Factor from SI and unit of each signal's residual, the same in all steps."""
+    return {
+        name: shorten(unit, *(step.residual[name] for step in answer.steps))
+        for name, unit in answer.units.items()
+    }
 
 
 def _sensor_units(overlays: Sequence[Overlay]) -> dict[str, tuple[float, str]]:
