@@ -54,7 +54,7 @@ def main() -> None:
     for name, comparison in judged.items():
         print(f"{name:40s} {comparison.replays['force'].residual:8.3f} N")
     for step in rigtwin.diagnose(fitted, held_out=held_out).answer.steps[1:]:
-        print(f"{'diagnosis, ' + step.added:40s} {step.left['force']:8.3f} N")
+        print(f"{'diagnosis, ' + step.added:40s} {step.residual['force']:8.3f} N")
 
 
 if __name__ == "__main__":

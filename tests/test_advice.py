@@ -40,7 +40,7 @@ def answer(verdict, **fields) -> Answer:
     return Answer(verdict=verdict, **(given | fields))
 
 
-LEFT = Place("load_cell", 1.0, (0.1, 2.0), "throughout", "what is left is best described by time")
+LEFT = Place("load_cell", 1.0, (0.1, 2.0), "throughout", "the residual correlates with time")
 
 
 @pytest.mark.parametrize("verdict", ["explained", "partly explained", "unknown", "no gap"])
@@ -57,7 +57,7 @@ def test_there_is_always_something_to_do_and_the_terminal_says_it_too(verdict, p
 
 def test_unusable_data_are_mended_first():
     (said,) = advise(answer("unusable"))
-    assert "Mend" in said
+    assert "Repair" in said
 
 
 def test_without_a_gap_nothing_is_corrected_but_what_was_not_seen_is_said():
@@ -68,17 +68,19 @@ def test_without_a_gap_nothing_is_corrected_but_what_was_not_seen_is_said():
 
 def test_what_fits_alike_is_told_apart_by_the_test_that_does_it():
     alike = finding("guide", "compliance", 0.5, "mount")
-    (hint,) = [s for s in advise(answer("explained", effects=(alike,))) if "cannot tell" in s]
+    (hint,) = [
+        s for s in advise(answer("explained", effects=(alike,))) if "cannot distinguish" in s
+    ]
     assert "compliance@guide from mount@guide" in hint
     test = NextTest("sweep", "rigtwin run any sweep", 20.0, ("compliance@guide", "mount@guide"))
     said = advise(answer("explained", effects=(alike,), next_test=test))
     assert any("`rigtwin run any sweep`" in each for each in said)
-    assert not any("cannot tell" in each for each in said)
+    assert not any("cannot distinguish" in each for each in said)
 
 
 def test_only_the_less_sure_effects_are_looked_at_again():
     both = (finding("rail", "coulomb", 0.97), finding("motor", "viscous", 0.7))
-    (hint,) = [s for s in advise(answer("explained", effects=both)) if "less sure" in s]
+    (hint,) = [s for s in advise(answer("explained", effects=both)) if "below 90 %" in s]
     assert "viscous@motor (70 %)" in hint
     assert "coulomb@rail" not in hint
 
@@ -93,7 +95,7 @@ def test_other_data_are_asked_for_only_where_none_were_held_out():
 
 def test_what_has_no_name_is_looked_for_where_it_lies():
     said = advise(answer("unknown", where=(LEFT,)))
-    assert any("load cell" in each and "described by time" in each for each in said)
+    assert any("load cell" in each and "correlates with time" in each for each in said)
 
 
 def test_one_part_is_named_once_and_joints_have_no_article():

@@ -118,9 +118,9 @@ def test_play_lies_within_a_few_millimetres_after_a_reversal():
 
 def test_what_was_found_one_after_another_is_told():
     found = answered(SINGLE["play"][0])
-    left = [step.left["load_cell"] for step in found.answer.steps]
+    residuals = [step.residual["load_cell"] for step in found.answer.steps]
     assert found.answer.steps[0].added == "nominal"
-    assert left[-1] < 0.05 * left[0]
+    assert residuals[-1] < 0.05 * residuals[0]
     document = found.document()
     assert document["steps"][1]["added"].startswith("with ")
     assert document["machine"] == "damper-bench"
@@ -195,11 +195,11 @@ def test_emps_on_its_held_out_recording(tmp_path: Path):
     assert str(found.effects[0].name) == "coulomb@guide"
     # Janot, Gautier and Brunot give 20.4 N.
     assert found.effects[0].parameters["coulomb"].value == pytest.approx(20.4, abs=1.5)
-    left = [step.left["force"] for step in found.answer.steps]
-    assert left[0] == pytest.approx(21.9, abs=0.2)
-    assert left[1] < 5.0
+    residuals = [step.residual["force"] for step in found.answer.steps]
+    assert residuals[0] == pytest.approx(21.9, abs=0.2)
+    assert residuals[1] < 5.0
     # A least-squares fit of mass, viscous, Coulomb and offset leaves 2.9 N.
-    assert min(left) < 2.5
+    assert min(residuals) < 2.5
     assert found.gap is not None
     assert found.gap.shrinkage_held_out.low > 0.85
     assert found.verdict == "partly explained"

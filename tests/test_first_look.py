@@ -40,7 +40,7 @@ def test_where_nothing_is_there_is_no_suspect():
     assert answer.verdict == "no gap"
     assert look.suspects == ()
     assert all(0.9 < level < 1.1 for level in look.gap.values())
-    assert str(look).startswith("no gap to speak of")
+    assert str(look).startswith("no significant gap")
 
 
 def test_the_command_says_it_before_the_answer(capfd, tmp_path):

@@ -230,10 +230,10 @@ def test_independent_joints_give_one_answer(tmp_path):
     assert sum(effect.share for effect in found.effects) == pytest.approx(1.0, abs=0.05)
     assert found.gap is not None
     assert found.verdict == "explained"
-    lefts = [step.left for step in found.answer.steps]
-    assert all(set(left) == {"torque_1", "torque_2"} for left in lefts)
-    assert lefts[0]["torque_1"] > 10.0 * lefts[-1]["torque_1"]
-    assert lefts[0]["torque_2"] > 10.0 * lefts[-1]["torque_2"]
+    residuals = [step.residual for step in found.answer.steps]
+    assert all(set(residual) == {"torque_1", "torque_2"} for residual in residuals)
+    assert residuals[0]["torque_1"] > 10.0 * residuals[-1]["torque_1"]
+    assert residuals[0]["torque_2"] > 10.0 * residuals[-1]["torque_2"]
     text = found.report(tmp_path / "report.html").read_text(encoding="utf-8")
     assert "shoulder" in text
     assert "elbow" in text

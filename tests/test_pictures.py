@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 from rigtwin.components.library import KINDS
-from rigtwin.diagnosis.figures import find_unit, say, thin
+from rigtwin.diagnosis.figures import thin
 from rigtwin.diagnosis.finding import Estimate, Finding, Name
 from rigtwin.diagnosis.overlay import Overlay, overlay
 from rigtwin.diagnosis.pictures import FORMS, PICTURES, Picture, picture, without_effect
+from rigtwin.diagnosis.units import find_unit, say
 from tests.helpers.twin import RIG, evidence_of, recorded, rig_effect
 
 GAIN = ("gain@load_cell=1.1",)
@@ -159,11 +160,9 @@ def test_what_the_commands_alone_say_is_not_promised_to_move_a_line():
 
 
 def test_a_picture_says_how_much_of_the_effect_its_recording_asks_for():
-    assert shown("gain@load_cell", gain=1.1).caption.endswith(
-        "asks for as much of it as was found."
-    )
+    assert shown("gain@load_cell", gain=1.1).caption.endswith("the effect has the fitted size.")
     evidence = evidence_of(recorded("imposed", GAIN, 3.5))
     twice = RIG.plant._replace(load_cell=RIG.plant.load_cell._replace(gain=1.15))
     found = picture(evidence, twice, finding_of("gain@load_cell", gain=1.15))
-    share = float(found.caption.rsplit(" asks for ", 1)[1].split(" times")[0])
+    share = float(found.caption.rsplit(" has ", 1)[1].split(" times")[0])
     assert share == pytest.approx(0.667, abs=0.05)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from rigtwin.diagnosis.text import tell_apart
+from rigtwin.diagnosis.text import format_distinct
 
 
 @pytest.mark.parametrize(
-    ("one", "other", "texts"),
+    ("first", "second", "texts"),
     [
         (24.012, 14.0, ("24.01", "14")),
         (7.4003, 7.4, ("7.4003", "7.4")),
@@ -17,5 +17,5 @@ from rigtwin.diagnosis.text import tell_apart
         (7.4, 7.4, ("7.4", "7.4")),
     ],
 )
-def test_numbers_are_told_apart(one, other, texts):
-    assert tell_apart(one, other) == texts
+def test_two_numbers_get_as_many_digits_as_distinguish_them(first, second, texts):
+    assert format_distinct(first, second) == texts

@@ -1,89 +1,93 @@
-"""What to do next, by what was found."""
+"""Advice on the next step after a diagnosis."""
 
 from __future__ import annotations
 
-from rigtwin.diagnosis.finding import Answer, Finding, Place
+from rigtwin.diagnosis.finding import Answer, Place
 from rigtwin.diagnosis.words import name_part
 
-SURE = 0.9
-"""Confidence from which an effect is corrected without another look."""
+CONFIDENT = 0.9
+"""Confidence from which an effect is corrected without inspecting the part first."""
+SAVE_TWIN = (
+    "Write the corrected twin with `rigtwin diagnose ... --save-twin twin.toml`, and use it "
+    "with `--config twin.toml`."
+)
 
 
 def advise(answer: Answer) -> tuple[str, ...]:
-    """What an engineer who has this answer does next, the most useful first.
+    """Return what an engineer does next, the most useful step first.
 
     Parameters
     ----------
     answer
-        Of a diagnosis.
+        Answer of a diagnosis.
 
     Returns
     -------
     tuple of str
-        Sentences. One at least.
+        Sentences, at least one.
     """
     if answer.verdict == "unusable":
-        return ("Mend what is said above in the recording, and diagnose it again.",)
+        return ("Repair the recording as the faults above say, and diagnose it again.",)
     if answer.verdict == "no gap":
-        missed = len(answer.not_observable)
-        unseen = "; what these data could not have shown is listed below" if missed else ""
-        return (f"Nothing needs to be corrected: use the twin as it is{unseen}.",)
-    keep = (
-        "Write the corrected twin with `rigtwin diagnose ... --save-twin twin.toml`, and use it "
-        "with `--config twin.toml`."
-    )
-    said = [keep] if answer.verdict == "explained" else []
-    said += _tell_apart(answer)
-    if unsure := [each for each in answer.effects if each.confidence < SURE]:
-        names = ", ".join(f"{each.name} ({100 * each.confidence:.0f} %)" for each in unsure)
-        said.append(
-            f"The names of the less sure ones, {names}, may be wrong where their sizes are right: "
-            "use the values, and look at the part before you repair anything."
+        invisible = (
+            "; the effects that these data could not have shown are listed below"
+            if answer.not_observable
+            else ""
+        )
+        return (f"Nothing needs to be corrected: use the twin as it is{invisible}.",)
+    steps = [SAVE_TWIN] if answer.verdict == "explained" else []
+    steps += _separate_rivals(answer)
+    if doubtful := [effect for effect in answer.effects if effect.confidence < CONFIDENT]:
+        names = ", ".join(f"{each.name} ({100 * each.confidence:.0f} %)" for each in doubtful)
+        steps.append(
+            f"These effects have a confidence below {100 * CONFIDENT:.0f} %: {names}. Their "
+            "values correct the twin even if another effect is the cause, so inspect the part "
+            "before repairing it."
         )
     if answer.verdict != "explained":
-        said += _look_further(answer)
+        steps += _locate_residual(answer)
     elif answer.gap is not None and "held-out" not in answer.gap.held_out:
-        said.append(
-            "Give another recording of the machine with `--held-out` to see whether the correction "
-            "holds there."
+        steps.append(
+            "Pass another recording of the machine with `--held-out` to test whether the "
+            "correction holds there."
         )
     if answer.verdict == "partly explained":
-        said.append(f"{keep} What is left, it leaves too.")
-    return tuple(said)
+        steps.append(f"{SAVE_TWIN} The corrected twin does not model the remaining residual.")
+    return tuple(steps)
 
 
-def _tell_apart(answer: Answer) -> list[str]:
-    """How explanations that fit alike would be separated."""
+def _separate_rivals(answer: Answer) -> list[str]:
+    """Return how to separate explanations that fit these data equally well."""
     if (test := answer.next_test) is not None:
         between = " from ".join(test.between[:2])
         return [f"Record `{test.command}`: that test separates {between}."]
-    alike = [
-        " from ".join(str(each) for each in effect.alternatives)
+    confounded = [
+        " from ".join(str(name) for name in effect.alternatives)
         for effect in answer.effects
         if len(effect.alternatives) > 1
     ]
-    if not alike:
+    if not confounded:
         return []
     return [
-        f"These data cannot tell {', nor '.join(alike)}; the twin is as good with either. A look "
-        "at the part tells, or a test in which they differ."
+        f"These data cannot distinguish {', nor '.join(confounded)}; the twin is equally good with "
+        "either. Inspect the part, or record a test in which they differ."
     ]
 
 
-def _look_further(answer: Answer) -> list[str]:
-    """Where to look for what has no name."""
-    named: list[Finding] = list(answer.effects)
+def _locate_residual(answer: Answer) -> list[str]:
+    """Return where to look for an effect that the library does not have."""
+    named = {effect.name.component for effect in answer.effects}
+    # Without located residuals, the places that no named effect accounts for are the next best.
     places: list[Place] = list(answer.leftovers) or [
-        place
-        for place in answer.where
-        if all(place.component != each.name.component for each in named)
+        place for place in answer.where if place.component not in named
     ]
     if not places:
         return [
-            "Something is left that no component explains; see where measured and predicted part."
+            "A residual remains that no single component explains; compare the measured and "
+            "predicted signals to see where they part."
         ]
     place = places[0]
     return [
-        f"What has no name here shows at the {name_part(place.component)}, {place.region}: "
+        f"Look for an unmodelled effect at the {name_part(place.component)}, {place.region}: "
         f"{place.evidence}."
     ]

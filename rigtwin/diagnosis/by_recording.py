@@ -1,5 +1,14 @@
-"""What each of several recordings asks of a machine's parameters: least squares to first order
-about one plant a recording, some parameters in common to all, others each recording's own."""
+"""Estimate a parameter in each of several recordings by linear least squares.
+
+The residual of recording r is linearised about one plant per recording,
+
+    e_r(θ) ≈ e_r - J_r θ_r,
+
+and its normal equations are kept for each recording and each stretch of time. Some parameters are
+common to all recordings, one may take a value per recording, and nuisance parameters (zeros of
+sensors, tolerances) are eliminated recording by recording through the Schur complement. Stretches
+of time make a jackknife of the standard errors cheap: it only adds up other normal equations.
+"""
 
 from __future__ import annotations
 
@@ -16,57 +25,97 @@ from rigtwin.diagnosis.space import PRIOR
 from rigtwin.numerics.arrays import Array
 
 BLOCKS = 10
-"""Stretches of each recording that are left out in turn."""
+"""Stretches of each recording that the jackknife leaves out in turn."""
 RIDGE = 1e-9
-"""Share of the normal matrix' diagonal that is added to it."""
+"""Share of the normal matrix' diagonal that is added to it.
+
+A parameter without any response would make the matrix singular."""
 
 
 @dataclass(frozen=True)
-class Column:
-    """One parameter that may be off. kind: `effect`, one that physics has; `zero`, of a sensor;
-    `tolerance`, in half widths; step: of its derivative, in its unit; others: values of
-    the effect's other parameters where it is not in the plant yet."""
+class FreeParameter:
+    """Parameter that may deviate from the plant, one column of the Jacobian.
+
+    Attributes
+    ----------
+    kind
+        "effect" for a parameter of an effect, "zero" for the zero of a sensor, "tolerance" for a
+        declared tolerance, in half widths.
+    group
+        Component that has the parameter.
+    parameter
+        Name of the parameter.
+    step
+        Step of the finite difference, in the parameter's SI unit.
+    effect
+        Effect that the parameter belongs to. None for zeros and tolerances.
+    companions
+        Names and values of the effect's other parameters, where the plant lacks the effect.
+    """
 
     kind: str
     group: str
     parameter: str
     step: float
     effect: Effect | None = None
-    others: tuple[tuple[str, float], ...] = ()
+    companions: tuple[tuple[str, float], ...] = ()
 
-    def moved(self, plant: Plant, amount: float) -> Plant:
-        """The plant with this parameter higher by that many steps, within its bounds."""
+    def value_in(self, plant: Plant) -> float:
+        """Return the parameter's value in a plant, SI."""
+        return float(getattr(getattr(plant, self.group), self.parameter))
+
+    def shift(self, plant: Plant, steps: float) -> Plant:
+        """Return a plant with this parameter raised by a number of steps, within its bounds."""
         part = getattr(plant, self.group)
-        value = float(getattr(part, self.parameter)) + amount * self.step
+        value = self.value_in(plant) + steps * self.step
         if self.effect is not None:
-            own = self.effect.quantities()[self.parameter]
-            value = min(max(value, own.low), own.high)
-        changed = part._replace(**{self.parameter: value, **dict(self.others)})
+            quantity = self.effect.quantities()[self.parameter]
+            value = min(max(value, quantity.low), quantity.high)
+        changed = part._replace(**{self.parameter: value, **dict(self.companions)})
         return plant._replace(**{self.group: changed})
 
 
 @dataclass(frozen=True)
-class Estimate:
-    """Of one parameter in each recording. moves, widths: steps from the plants, and their standard
-    errors, shape (recordings,); common: steps of the parameters in common; left: χ² that stays,
-    in units of what the plants leave."""
+class RecordingEstimates:
+    """Estimates of one parameter in every recording.
+
+    Attributes
+    ----------
+    moves
+        Deviation from the plant of each recording, in steps, shape (recordings,).
+    widths
+        Standard errors of `moves`, in steps, shape (recordings,).
+    common
+        Deviation of the common parameters, in steps, shape (common,).
+    misfit
+        Remaining χ², in units of the plants' own residual power where `relative` was chosen.
+    """
 
     moves: Array
     widths: Array
     common: Array
-    left: float
+    misfit: float
 
 
 @dataclass(frozen=True)
 class ByRecording:
-    """Normal equations of each stretch of each recording.
+    """Normal equations of every stretch of every recording.
 
-    normal: shape (recordings, blocks, columns, columns); gradient: of a descent, shape
-    (recordings, blocks, columns); power: of what the plants leave, shape (recordings, blocks);
-    pieces: independent ones that it consists of, shape (recordings,).
+    Attributes
+    ----------
+    columns
+        Free parameters.
+    normal
+        JᵀJ, shape (recordings, blocks, columns, columns).
+    gradient
+        Jᵀe, the direction of descent, shape (recordings, blocks, columns).
+    power
+        eᵀe, shape (recordings, blocks).
+    pieces
+        Number of independent samples in the residual of each recording, shape (recordings,).
     """
 
-    columns: tuple[Column, ...]
+    columns: tuple[FreeParameter, ...]
     normal: Array
     gradient: Array
     power: Array
@@ -77,132 +126,138 @@ class ByRecording:
         cls,
         evidence: Evidence,
         plants: Sequence[Plant],
-        columns: Sequence[Column],
+        columns: Sequence[FreeParameter],
         relative: bool = True,
     ) -> ByRecording:
-        """About one plant a recording.
+        """Linearise the residuals about one plant per recording.
 
         Parameters
         ----------
         evidence
-            The recordings.
+            Recordings.
         plants
-            One each.
+            One plant for each recording.
         columns
-            Parameters that may be off.
+            Parameters that may deviate.
         relative
-            Whether χ² is in units of what each plant leaves, so that a rough model's error is no
-            evidence; or of what its signals are held to.
+            Whether χ² is in units of the residual that the plant of each recording leaves, so that
+            the error of a rough model is no evidence. Otherwise it is in units of noise and
+            declared error. Default True.
 
         Returns
         -------
         ByRecording
-            To first order.
+            Normal equations.
         """
-        found = [
+        equations = [
             _equations(evidence, number, plant, columns, relative)
             for number, plant in enumerate(plants)
         ]
-        normal, gradient, power, pieces = (np.stack(each) for each in zip(*found, strict=True))
+        normal, gradient, power, pieces = (np.stack(part) for part in zip(*equations, strict=True))
         return cls(tuple(columns), normal, gradient, power, pieces)
 
     @property
     def total(self) -> float:
-        """χ² of what the plants leave."""
+        """χ² of the plants' residuals."""
         return float(self.power.sum())
 
-    def seen(self, number: int, free: Sequence[int]) -> Array:
-        """How much of a column's response others cannot take up, as a share of it, of each
-        recording; 0 where it does nothing.
+    def visible_share(self, number: int, nuisances: Sequence[int]) -> Array:
+        """Return the share of a parameter's response that nuisance parameters cannot imitate.
 
         Parameters
         ----------
         number
-            Of the column.
-        free
-            Of the others.
+            Column of the parameter.
+        nuisances
+            Columns of the nuisance parameters.
 
         Returns
         -------
         array
-            0 to 1, shape (recordings,).
+            Shares, 0 to 1, shape (recordings,); 0 where the parameter has no response.
         """
-        rest = [other for other in free if other != number]
+        rest = [column for column in nuisances if column != number]
         shares = []
         for whole in self.normal.sum(axis=1):
-            own = whole[number, number]
+            response = whole[number, number]
             inner = whole[np.ix_(rest, rest)] + self._prior(rest, whole)
-            taken = whole[rest, number] @ np.linalg.solve(inner, whole[rest, number])
-            shares.append(max(own - taken, 0.0) / own if own > 0.0 else 0.0)
+            imitated = whole[rest, number] @ np.linalg.solve(inner, whole[rest, number])
+            shares.append(max(response - imitated, 0.0) / response if response > 0.0 else 0.0)
         return np.array(shares)
 
-    def estimate(self, tested: int | None, common: Sequence[int], own: Sequence[int]) -> Estimate:
-        """A parameter of each recording alone.
+    def estimate(
+        self, tested: int | None, common: Sequence[int], nuisances: Sequence[int]
+    ) -> RecordingEstimates:
+        """Estimate one parameter in each recording.
 
         Parameters
         ----------
         tested
-            Column that each recording may have another value of, None for none.
+            Column of the parameter that may differ between recordings. None for no such parameter.
         common
-            Columns that all have one value of.
-        own
-            Columns that are each recording's own without anybody asking: zeros, tolerances.
+            Columns with one value for all recordings.
+        nuisances
+            Columns with a value per recording that is of no interest: zeros, tolerances.
 
         Returns
         -------
-        Estimate
-            With standard errors by the jackknife over stretches, or those of independent pieces
-            where these are wider.
+        RecordingEstimates
+            Estimates. Their standard errors come from the jackknife over stretches of time, or from
+            the number of independent samples where that gives wider ones.
         """
         whole, right = self.normal.sum(axis=1), self.gradient.sum(axis=1)
-        kept = [*common] if tested is None else [*common, tested]
-        # Without any move nuisances take up something too.
-        parts = [self._reduce(n, g, kept, own) for n, g in zip(whole, right, strict=True)]
+        columns = [*common] if tested is None else [*common, tested]
+        # The nuisances lower χ² even where no other parameter moves; `_reduce` counts that too.
+        parts = [self._reduce(n, g, columns, nuisances) for n, g in zip(whole, right, strict=True)]
         moves, shared, gained = _assemble(parts, len(common))
-        left = self.total - gained
+        misfit = self.total - gained
         if tested is None:
-            return Estimate(moves, np.zeros(len(parts)), shared, left)
+            return RecordingEstimates(moves, np.zeros(len(parts)), shared, misfit)
+        # Variance of the estimate: residual variance per independent sample over the information.
         formal = []
         for number, (inner, _, _) in enumerate(parts):
             share = float(self.power[number].sum())
             information = max(inner[-1, -1], 1e-300)
             formal.append(
-                share * left / max(self.total, 1e-300) / self.pieces[number] / information
+                share * misfit / max(self.total, 1e-300) / self.pieces[number] / information
             )
-        return Estimate(
-            moves,
-            np.maximum(np.sqrt(np.array(formal)), self._jackknife(parts, kept, own, len(common))),
-            shared,
-            left,
-        )
+        jackknife = self._jackknife(parts, columns, nuisances, len(common))
+        widths = np.maximum(np.sqrt(np.array(formal)), jackknife)
+        return RecordingEstimates(moves, widths, shared, misfit)
 
     def _jackknife(
         self,
         parts: list[tuple[Array, Array, float]],
-        kept: Sequence[int],
-        own: Sequence[int],
+        columns: Sequence[int],
+        nuisances: Sequence[int],
         common: int,
     ) -> Array:
-        spread = np.zeros(len(parts))
+        """Standard errors by the delete-one-block jackknife, shape (recordings,).
+
+        Each recording loses one block of n in turn; the variance is (n - 1)/n Σ (θ_b - mean θ)².
+        The blocks of one recording also move the estimates of the others through the common
+        parameters, so the variances of all recordings add.
+        """
+        variance = np.zeros(len(parts))
         blocks = self.normal.shape[1]
         for number in range(len(parts)):
-            rest = []
+            estimates = []
             for block in range(blocks):
-                left = np.arange(blocks) != block
+                remaining = np.arange(blocks) != block
                 part = self._reduce(
-                    self.normal[number, left].sum(axis=0),
-                    self.gradient[number, left].sum(axis=0),
-                    kept,
-                    own,
+                    self.normal[number, remaining].sum(axis=0),
+                    self.gradient[number, remaining].sum(axis=0),
+                    columns,
+                    nuisances,
                 )
                 changed = [*parts[:number], part, *parts[number + 1 :]]
-                rest.append(_assemble(changed, common)[0])
-            moved = np.stack(rest)
-            spread += (blocks - 1) / blocks * np.sum((moved - moved.mean(axis=0)) ** 2, axis=0)
-        return np.sqrt(spread)
+                estimates.append(_assemble(changed, common)[0])
+            moves = np.stack(estimates)
+            variance += (blocks - 1) / blocks * np.sum((moves - moves.mean(axis=0)) ** 2, axis=0)
+        return np.sqrt(variance)
 
     def _prior(self, numbers: Sequence[int], whole: Array) -> Array:
-        """What moving these columns costs: a tolerance its prior, others next to nothing."""
+        """Prior precision of columns: a Gaussian for a tolerance, a ridge for every other one."""
         costs = [
             PRIOR
             if self.columns[number].kind == "tolerance"
@@ -212,44 +267,62 @@ class ByRecording:
         return np.diag(np.array(costs)) if costs else np.zeros((0, 0))
 
     def _reduce(
-        self, whole: Array, right: Array, kept: Sequence[int], own: Sequence[int]
+        self, whole: Array, right: Array, columns: Sequence[int], nuisances: Sequence[int]
     ) -> tuple[Array, Array, float]:
-        """Normal matrix and gradient of the columns that are kept, with a recording's own taken
-        out, and the χ² that these gain."""
-        inner = whole[np.ix_(own, own)] + self._prior(own, whole)
-        cross = whole[np.ix_(own, kept)]
-        solved = np.linalg.solve(inner, np.column_stack([cross, right[own]]))
-        normal = whole[np.ix_(kept, kept)] - cross.T @ solved[:, :-1]
+        """Normal matrix and gradient after the nuisances are eliminated, and the χ² they gain.
+
+        The Schur complement N_cc - N_cn N_nn^-1 N_nc is the information on the columns when the
+        nuisances are free.
+        """
+        inner = whole[np.ix_(nuisances, nuisances)] + self._prior(nuisances, whole)
+        cross = whole[np.ix_(nuisances, columns)]
+        solved = np.linalg.solve(inner, np.column_stack([cross, right[nuisances]]))
+        normal = whole[np.ix_(columns, columns)] - cross.T @ solved[:, :-1]
         return (
-            normal + self._prior(kept, whole),
-            right[kept] - cross.T @ solved[:, -1],
-            float(right[own] @ solved[:, -1]),
+            normal + self._prior(columns, whole),
+            right[columns] - cross.T @ solved[:, -1],
+            float(right[nuisances] @ solved[:, -1]),
         )
 
 
 def _assemble(
     parts: Sequence[tuple[Array, Array, float]], common: int
 ) -> tuple[Array, Array, float]:
-    """Solves for the parameters in common and each recording's own: the latter, the former, and
-    the χ² gained."""
+    """Solve for the tested parameter of each recording and the common ones.
+
+    Parameters
+    ----------
+    parts
+        Normal matrix, gradient and χ² already gained of each recording. The common columns come
+        first, then the tested one if there is any.
+    common
+        Number of common columns.
+
+    Returns
+    -------
+    tuple
+        Tested values, shape (recordings,), common values, shape (common,), and the χ² gained.
+    """
     shared, right = np.zeros((common, common)), np.zeros(common)
-    tested = len(parts[0][1]) > common
+    is_tested = len(parts[0][1]) > common
     gained = 0.0
-    for normal, gradient, taken in parts:
-        cross, own = normal[:common, common:], normal[common:, common:]
+    # The tested parameter of each recording is eliminated first, again by the Schur complement.
+    for normal, gradient, nuisance_gain in parts:
+        cross, pivot = normal[:common, common:], normal[common:, common:]
         shared += normal[:common, :common]
         right += gradient[:common]
-        gained += taken
-        if tested:
-            shared -= cross @ cross.T / own[0, 0]
-            right -= cross[:, 0] * gradient[common] / own[0, 0]
-            gained += float(gradient[common] ** 2 / own[0, 0])
+        gained += nuisance_gain
+        if is_tested:
+            shared -= cross @ cross.T / pivot[0, 0]
+            right -= cross[:, 0] * gradient[common] / pivot[0, 0]
+            gained += float(gradient[common] ** 2 / pivot[0, 0])
+    # Two common parameters may be confounded, so the shared matrix may be singular.
     values = np.linalg.lstsq(shared, right, rcond=1e-12)[0] if common else np.zeros(0)
     gained += float(right @ values)
     moves = np.array(
         [
             (gradient[common] - normal[common, :common] @ values) / normal[common, common]
-            if tested
+            if is_tested
             else 0.0
             for normal, gradient, _ in parts
         ]
@@ -258,38 +331,55 @@ def _assemble(
 
 
 def differences_of(evidence: Evidence, number: int, plant: Plant) -> Array:
-    """Measured less predicted of one recording, spikes apart, shape (rows, ticks)."""
+    """Return the residual of one recording without spikes.
+
+    Parameters
+    ----------
+    evidence
+        Recordings.
+    number
+        Index of the recording.
+    plant
+        Plant that predicts the signals.
+
+    Returns
+    -------
+    array
+        Measured minus predicted, SI, shape (rows, ticks).
+    """
     lines = evidence.lines[number]
     difference = lines.measured - evidence.models[number].predict(plant)
     for row, meaning in enumerate(evidence.machine.rows):
+        # Signals that jump, such as dry friction at a reversal, spike where a jump is a tick late.
         if meaning.kind in JUMPS:
             despike(difference[row], SPIKE * float(lines.noise[row]))
     return difference
 
 
 def _equations(
-    evidence: Evidence, number: int, plant: Plant, columns: Sequence[Column], relative: bool
+    evidence: Evidence, number: int, plant: Plant, columns: Sequence[FreeParameter], relative: bool
 ) -> tuple[Array, Array, Array, float]:
+    """Normal matrix, gradient and power of each block, and the number of independent samples."""
     lines = evidence.lines[number]
     forms = np.array([evidence.machine.form_of(row) for row in evidence.machine.rows])
     scale = np.sqrt(lines.noise**2 + (forms * np.std(lines.measured, axis=1)) ** 2)
     weight = lines.fade / scale[:, None]
-    here = weight * differences_of(evidence, number, plant)
+    residual = weight * differences_of(evidence, number, plant)
     jacobian = []
     for column in columns:
         sign = 1.0
-        there = column.moved(plant, sign)
-        value = float(getattr(getattr(there, column.group), column.parameter))
-        reached = value - float(getattr(getattr(plant, column.group), column.parameter))
-        if abs(reached) < 0.5 * abs(column.step):
-            sign, there = -1.0, column.moved(plant, -1.0)
-        jacobian.append(sign * (here - weight * differences_of(evidence, number, there)))
-    unit = max(float(np.sqrt(np.mean(here**2))), 1e-300) if relative else 1.0
-    flat = np.stack([*jacobian, here]) / unit
+        changed = column.shift(plant, sign)
+        # A step that a bound cuts short is taken to the other side instead.
+        if abs(column.value_in(changed) - column.value_in(plant)) < 0.5 * abs(column.step):
+            sign, changed = -1.0, column.shift(plant, -1.0)
+        jacobian.append(sign * (residual - weight * differences_of(evidence, number, changed)))
+    unit = max(float(np.sqrt(np.mean(residual**2))), 1e-300) if relative else 1.0
+    flat = np.stack([*jacobian, residual]) / unit
     cuts = np.linspace(0, flat.shape[2], BLOCKS + 1).astype(int)
+    # One product per block holds JᵀJ, Jᵀe and eᵀe: the residual is its last row and column.
     products = np.stack(
         [
-            (part := flat[:, :, low:high].reshape(len(flat), -1)) @ part.T
+            (block := flat[:, :, low:high].reshape(len(flat), -1)) @ block.T
             for low, high in pairwise(cuts)
         ]
     )
@@ -297,12 +387,15 @@ def _equations(
         products[:, :-1, :-1],
         products[:, :-1, -1],
         products[:, -1, -1],
-        _count_independent(here),
+        _count_independent(residual),
     )
 
 
-def _count_independent(left: Array) -> float:
-    """How many independent pieces a difference consists of: the lines that share its power,
-    twice; shape (rows, ticks)."""
-    power = np.abs(np.fft.rfft(left, axis=1)) ** 2
+def _count_independent(residual: Array) -> float:
+    """Number of independent samples of a residual, shape (rows, ticks).
+
+    The power of white noise is exponentially distributed over its n spectral lines, for which
+    (Σ P)² / Σ P² = n / 2. Each line stands for two real numbers: hence the factor 4.
+    """
+    power = np.abs(np.fft.rfft(residual, axis=1)) ** 2
     return max(4.0 * float(power.sum()) ** 2 / max(float((power**2).sum()), 1e-300), 4.0)

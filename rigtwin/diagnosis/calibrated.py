@@ -1,5 +1,7 @@
-"""The corrected twin as TOML, which `run` and `compare` take with --config: only what differs from
-the nominal machine."""
+"""Corrected twin as TOML, which `run` and `compare` take with `--config`.
+
+The file holds only the values that differ from the described machine, and how uncertain they are.
+"""
 
 from __future__ import annotations
 
@@ -21,15 +23,30 @@ if TYPE_CHECKING:
 
 
 def toml(diagnosis: Diagnosis) -> str:
-    """The file's text. Values in full precision, so that the twin is the same to the bit."""
+    """Write the corrected twin as TOML text.
+
+    Parameters
+    ----------
+    diagnosis
+        Diagnosis with a corrected twin.
+
+    Returns
+    -------
+    str
+        TOML with the answer as a comment, the changed values, and their posterior.
+    """
     answer = diagnosis.answer
+    # A file name may hold a line break, which would end the comment: hence `printable`.
     lines = [f"# {answer.verdict}: {answer.sentence}"]
     lines += [f"# from {printable(str(recording))}" for recording in answer.recordings]
     lines += [
-        f"# the controller's {each}" for each in map(_describe_setting, answer.effects) if each
+        f"# the controller's {setting}"
+        for setting in map(_describe_setting, answer.effects)
+        if setting
     ]
     lines += format_changes(diagnosis.described.plant, diagnosis.machine.plant)
     described, corrected = diagnosis.described, diagnosis.machine
+    # A friction compensator, for example, is set from the corrected friction.
     if advice := described.physics.advise_controller(described.plant, corrected.plant):
         lines += ["", "[controller]", *(f"{name} = {value!r}" for name, value in advice.items())]
     if answer.effects:
@@ -38,46 +55,54 @@ def toml(diagnosis: Diagnosis) -> str:
 
 
 def format_changes(described: Plant, corrected: Plant) -> list[str]:
-    """What a corrected plant has other than the described one.
+    """Write the values in which a corrected plant differs from the described one.
 
     Parameters
     ----------
     described, corrected
-        Of one machine.
+        Plants of one machine.
 
     Returns
     -------
     list of str
-        TOML, a line each, one table a component that differs.
+        Lines of TOML, with one table for each component that differs.
     """
     nominal = flatten(Configuration(plant=described, controller=Nothing()))
     changed = flatten(Configuration(plant=corrected, controller=Nothing()))
     lines: list[str] = []
     for group in described._fields:
-        own = {key: value for key, value in changed[group].items() if value != nominal[group][key]}
-        if own:
-            lines += ["", f"[{group}]", *(f"{key} = {value!r}" for key, value in own.items())]
+        differing = {
+            key: value for key, value in changed[group].items() if value != nominal[group][key]
+        }
+        if differing:
+            # `repr` writes a float in full precision, so the loaded twin is equal to the bit.
+            lines += ["", f"[{group}]", *(f"{key} = {value!r}" for key, value in differing.items())]
     return lines
 
 
 def _posterior(diagnosis: Diagnosis) -> Posterior:
-    """How sure the values are, and what else would explain the recordings."""
+    """Intervals of the corrected values, and the other explanations with their probability."""
     intervals = {
-        f"{GROUPS.get(effect.name.component, effect.name.component)}.{name}": (each.low, each.high)
+        f"{GROUPS.get(effect.name.component, effect.name.component)}.{name}": (
+            estimate.low,
+            estimate.high,
+        )
         for effect in diagnosis.effects
+        # A setting belongs to the controller, and "unknown" has no value: neither is in the plant.
         if effect.name.kind not in ("setting", "unknown")
-        for name, each in effect.parameters.items()
+        for name, estimate in effect.parameters.items()
     }
-    sure = min(effect.confidence for effect in diagnosis.effects)
+    confidence = min(effect.confidence for effect in diagnosis.effects)
     return Posterior(
         {},
         intervals,
-        sure,
-        tuple(_otherwise(fit, probability) for fit, probability in diagnosis.otherwise),
+        confidence,
+        tuple(_alternative(fit, probability) for fit, probability in diagnosis.otherwise),
     )
 
 
-def _otherwise(fit: Fit, probability: float) -> Otherwise:
+def _alternative(fit: Fit, probability: float) -> Otherwise:
+    """Other explanation as changes of the plant, by component."""
     changes: dict[str, dict[str, object]] = {}
     for effect, values in zip(fit.effects, fit.values, strict=True):
         changes.setdefault(effect.group, {}).update(
@@ -87,18 +112,38 @@ def _otherwise(fit: Fit, probability: float) -> Otherwise:
 
 
 def _describe_setting(effect: Finding) -> str:
-    """A setting that is not what the recording says, which is the operator's to change."""
+    """Describe a controller setting that deviates from the recording; the operator corrects it."""
     if effect.name.kind != "setting":
         return ""
     return ", ".join(
-        f"{name} was {each.value:g}, told {each.nominal:g}"
-        for name, each in effect.parameters.items()
+        f"{name} was {estimate.value:g}, configured as {estimate.nominal:g}"
+        for name, estimate in effect.parameters.items()
     )
 
 
 def save(path: Path, diagnosis: Diagnosis) -> Path:
-    """Writes it. Raises RigtwinError if it cannot, or if the data were not fit for a diagnosis."""
+    """Write the corrected twin to a file.
+
+    Parameters
+    ----------
+    path
+        File to be written.
+    diagnosis
+        Diagnosis with a corrected twin.
+
+    Returns
+    -------
+    Path
+        The path.
+
+    Raises
+    ------
+    RigtwinError
+        If the recordings could not be diagnosed, or the file cannot be written.
+    """
     if diagnosis.evidence is None:
-        raise RigtwinError(f"{path} not written: the data cannot be diagnosed")
+        raise RigtwinError(
+            f"{path} not written: the recordings cannot be diagnosed, so there is no corrected twin"
+        )
     atomic_write(path, toml(diagnosis))
     return path

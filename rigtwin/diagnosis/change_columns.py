@@ -1,4 +1,4 @@
-"""The parameters that may differ between recordings: of effects, zeros of sensors, tolerances."""
+"""Parameters that may differ between recordings: of effects, zeros of sensors, tolerances."""
 
 from __future__ import annotations
 
@@ -9,76 +9,84 @@ import numpy as np
 from rigtwin.components import Effect, measures
 from rigtwin.components.plant import Plant
 from rigtwin.description.machine import Machine
-from rigtwin.diagnosis.by_recording import Column
+from rigtwin.diagnosis.by_recording import FreeParameter
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.fit import is_possible
 from rigtwin.diagnosis.fitter import LIMITS, Fitter
 
-WIDE = 3.0
-"""Times the steps of a search at which responses are taken: what sticks answers small ones by
-chance."""
+STEP_FACTOR = 3.0
+"""Ratio of the finite-difference steps to those of a search.
+
+A joint that sticks answers a small step by chance: it starts a tick earlier or later."""
+ZERO_STEP = 0.02
+"""Finite-difference step of a sensor's zero, in standard deviations of its signal."""
 
 
-def columns_of(
-    fitter: Fitter, named: Sequence[Effect], others: Sequence[Effect], plant: Plant
-) -> list[Column]:
-    """Everything that may be another in each recording.
+def list_parameters(
+    fitter: Fitter, named: Sequence[Effect], candidates: Sequence[Effect], plant: Plant
+) -> list[FreeParameter]:
+    """List every parameter that may differ between recordings.
 
     Parameters
     ----------
     fitter
-        Of the recordings.
+        Fitter of the recordings.
     named
         Effects that the plant has.
-    others
-        That it may have.
+    candidates
+        Effects that the plant lacks but the machine may have.
     plant
-        About which responses are taken.
+        Plant about which responses are taken.
 
     Returns
     -------
-    list of Column
-        Effects first, then zeros of sensors, then tolerances.
+    list of FreeParameter
+        Parameters of effects first, then zeros of sensors, then tolerances.
     """
     evidence = fitter.evidence
-    found = [*_of_effects(fitter, named, others, plant), *_of_zeros(evidence)]
-    taken = [evidence.machine.tolerance_of(each.group, each.parameter) for each in found]
-    found += [
-        Column("tolerance", each.group, each.parameter, evidence.width(each))
-        for each in evidence.machine.tolerances
-        if each not in taken and evidence.width(each) > 0.0
+    parameters = [*_of_effects(fitter, named, candidates, plant), *_of_zeros(evidence)]
+    # A tolerance of a parameter that is listed already would be free twice.
+    listed = [evidence.machine.tolerance_of(each.group, each.parameter) for each in parameters]
+    parameters += [
+        FreeParameter("tolerance", tolerance.group, tolerance.parameter, evidence.width(tolerance))
+        for tolerance in evidence.machine.tolerances
+        if tolerance not in listed and evidence.width(tolerance) > 0.0
     ]
-    return found
+    return parameters
 
 
 def _of_effects(
-    fitter: Fitter, named: Sequence[Effect], others: Sequence[Effect], plant: Plant
-) -> list[Column]:
-    found = []
-    for effect in (*named, *others):
-        zero = measures(effect.of()) and effect.kind.name == "offset"
+    fitter: Fitter, named: Sequence[Effect], candidates: Sequence[Effect], plant: Plant
+) -> list[FreeParameter]:
+    parameters = []
+    for effect in (*named, *candidates):
+        is_zero = measures(effect.of()) and effect.kind.name == "offset"
         starts = fitter.starts(effect)
-        there = effect in named
-        if zero or effect.kind.name in LIMITS or (starts.quadrature and not there):
+        is_named = effect in named
+        # Zeros are nuisances. Limits, and waves of unknown phase, have no linear response to test.
+        if is_zero or effect.kind.name in LIMITS or (starts.quadrature and not is_named):
             continue
-        if not there and not is_possible((*named, effect), plant):
+        if not is_named and not is_possible((*named, effect), plant):
             continue
         steps = dict(zip(effect.kind.parameters, starts.steps, strict=True))
-        first, *rest = effect.kind.parameters
-        if there:
-            found += [
-                Column("effect", effect.group, name, WIDE * step, effect)
+        if is_named:
+            parameters += [
+                FreeParameter("effect", effect.group, name, STEP_FACTOR * step, effect)
                 for name, step in steps.items()
             ]
-        else:
-            given = dict(zip(effect.kind.parameters, starts.values[0], strict=True))
-            more = tuple((name, given[name]) for name in rest)
-            found.append(Column("effect", effect.group, first, WIDE * steps[first], effect, more))
-    return [column for column in found if column.step > 0.0]
+            continue
+        # Of an effect that the plant lacks, only the magnitude is free; its shape parameters stand
+        # at the values where a search starts.
+        first, *shape = effect.kind.parameters
+        values = dict(zip(effect.kind.parameters, starts.values[0], strict=True))
+        companions = tuple((name, values[name]) for name in shape)
+        step = STEP_FACTOR * steps[first]
+        parameters.append(FreeParameter("effect", effect.group, first, step, effect, companions))
+    return [parameter for parameter in parameters if parameter.step > 0.0]
 
 
-def _of_zeros(evidence: Evidence) -> list[Column]:
-    found = []
+def _of_zeros(evidence: Evidence) -> list[FreeParameter]:
+    zeros = []
     for name in sensors_of(evidence.machine):
         component = evidence.machine.components[name]
         assert component.channel is not None
@@ -86,12 +94,23 @@ def _of_zeros(evidence: Evidence) -> list[Column]:
             float(np.std(recording.column(*component.channel))) for recording in evidence.recordings
         )
         if spread > 0.0:
-            found.append(Column("zero", name, "offset", 0.02 * spread))
-    return found
+            zeros.append(FreeParameter("zero", name, "offset", ZERO_STEP * spread))
+    return zeros
 
 
 def sensors_of(machine: Machine) -> list[str]:
-    """Sensors that may have another zero in each recording."""
+    """Return the sensors whose zero may differ between recordings.
+
+    Parameters
+    ----------
+    machine
+        Machine whose components are searched.
+
+    Returns
+    -------
+    list of str
+        Names of the sensors that are recorded and have an offset.
+    """
     return [
         name
         for name, component in machine.components.items()

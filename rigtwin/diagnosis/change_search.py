@@ -1,5 +1,9 @@
-"""Looks for the parameters that have not one value in all recordings: each as the only one that may
-differ, beside what the diagnosis of all together names."""
+"""Search for the parameters that differ between recordings.
+
+Every parameter is tested as the only one that may differ, beside the effects that the joint
+diagnosis names. The most promising ones are fitted with a value per recording; the one with the
+smallest remaining χ² enters the model, and the search is repeated.
+"""
 
 from __future__ import annotations
 
@@ -11,9 +15,14 @@ from functools import reduce
 import numpy as np
 
 from rigtwin.components.plant import Plant
-from rigtwin.diagnosis.by_recording import BLOCKS, ByRecording, Column, Estimate
-from rigtwin.diagnosis.change import Parameter
-from rigtwin.diagnosis.change_columns import columns_of
+from rigtwin.diagnosis.by_recording import (
+    BLOCKS,
+    ByRecording,
+    FreeParameter,
+    RecordingEstimates,
+)
+from rigtwin.diagnosis.change import ComparedParameter
+from rigtwin.diagnosis.change_columns import list_parameters
 from rigtwin.diagnosis.finding import Interval, Name
 from rigtwin.diagnosis.fitter import Fitter
 from rigtwin.diagnosis.homogeneity import check_homogeneity, correct
@@ -24,59 +33,127 @@ from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
 
 ROUNDS = 4
-"""Times that responses are taken anew at the values of each recording."""
+"""Largest number of Gauss-Newton steps of a parameter's values in all recordings."""
 FOLLOWED = 6
-"""Parameters that are followed to each recording's own value."""
-SMALL = 1e-3
-"""Share of what is left that a step must gain to be followed by another."""
-PARTS = (1.0, 0.5, 0.2)
-"""Shares of a step that are tried."""
+"""Number of parameters that are fitted with a value per recording in each round."""
+CONVERGED = 1e-3
+"""Share of the remaining χ² that a step must gain for another to follow."""
+STEP_SHARES = (1.0, 0.5, 0.2)
+"""Shares of a step that are tried in turn until χ² falls."""
+FREEDOM = float(BLOCKS - 1)
+"""Degrees of freedom of each standard error: those of a jackknife over `BLOCKS` blocks."""
 
 
 @dataclass(frozen=True)
-class _Tested:
+class _TestedParameter:
+    """A parameter as the only one that may differ, to first order.
+
+    Attributes
+    ----------
+    number
+        Index of the parameter.
+    estimate
+        Values in all recordings.
+    statistic
+        Cochran's Q of these values.
+    probability
+        Its p-value, corrected for the number of tests.
+    without
+        χ² that remains if the parameter is the same in all recordings.
+    """
+
     number: int
-    estimate: Estimate
+    estimate: RecordingEstimates
     statistic: float
     probability: float
     without: float
 
 
 @dataclass(frozen=True)
-class _Followed:
-    """A parameter's values in each recording, tested anew there, the χ² that they leave, and the
-    plants that have them."""
+class _FittedParameter:
+    """A parameter after its values were fitted in every recording.
 
-    tested: _Tested
+    Attributes
+    ----------
+    tested
+        Test at the fitted values.
+    values
+        Fitted values, SI, shape (recordings,).
+    misfit
+        Remaining χ².
+    plants
+        Plants with these values, one per recording.
+    """
+
+    tested: _TestedParameter
     values: Array
-    left: float
+    misfit: float
     plants: tuple[Plant, ...]
 
 
 @dataclass(frozen=True)
-class Compared:
-    """parameters: those that changed and those that are named; unseen: effects of which nobody can
-    tell; tested: how many were; left: χ² that stays."""
+class ChangeModel:
+    """Result of one search.
 
-    parameters: tuple[Parameter, ...]
-    unseen: tuple[Name, ...]
+    Attributes
+    ----------
+    parameters
+        Parameters that changed, then those of the named effects.
+    undetermined
+        Effects for which the recordings cannot show a change.
+    tested
+        Number of parameters that were tested.
+    misfit
+        Remaining χ².
+    """
+
+    parameters: tuple[ComparedParameter, ...]
+    undetermined: tuple[Name, ...]
     tested: int
-    left: float
+    misfit: float
 
     def cost(self, pieces: float, price: float) -> float:
-        """What stays, as χ² of so many independent pieces, and a price for each change."""
-        count = sum(each.verdict == "changed" for each in self.parameters)
-        return pieces * math.log(max(self.left, 1e-300)) + price * count
+        """Return n ln χ² plus a price for each change, with n independent samples.
+
+        Parameters
+        ----------
+        pieces
+            Number of independent samples n.
+        price
+            Price of one change.
+
+        Returns
+        -------
+        float
+            Cost by which searches from different starts are compared, as in an information
+            criterion with unknown variance.
+        """
+        count = sum(parameter.verdict == "changed" for parameter in self.parameters)
+        return pieces * math.log(max(self.misfit, 1e-300)) + price * count
 
 
 class ChangeSearch:
-    """Looks for parameters that are not the same in all recordings."""
+    """Search for parameters that differ between the recordings of a joint diagnosis."""
 
     def __init__(
         self, together: Diagnosis, thresholds: Thresholds, start: Diagnosis | None = None
     ) -> None:
-        """start: whose effects and values the search starts from, by default those of all
-        together."""
+        """Prepare the search.
+
+        Parameters
+        ----------
+        together
+            Joint diagnosis of all recordings.
+        thresholds
+            Thresholds of the comparison.
+        start
+            Diagnosis whose effects and values the search starts from. Defaults to `together`.
+
+        Raises
+        ------
+        RigtwinError
+            If the recordings cannot be diagnosed.
+        """
         if together.evidence is None:
             raise RigtwinError(together.sentence)
         start = start or together
@@ -84,226 +161,265 @@ class ChangeSearch:
         self.machine = self.evidence.machine
         self.count = len(self.evidence.recordings)
         self.plant: Plant = start.corrected.plant
+        # A joint model that leaves only noise is right for every recording unless a test is sure.
         self._settled = start is together and together.verdict in ("no gap", "explained")
         named = {str(effect.name) for effect in start.effects}
         self._fitter = Fitter(self.evidence)
         searched = [effect for effect in self.machine.effects() if effect.searched]
         self._named = [effect for effect in searched if effect.name in named]
-        self._others = [effect for effect in searched if effect not in self._named]
-        self.columns = columns_of(self._fitter, self._named, self._others, self.plant)
-        self._stand([self.plant] * self.count)
+        candidates = [effect for effect in searched if effect not in self._named]
+        self.columns = list_parameters(self._fitter, self._named, candidates, self.plant)
+        self._linearise([self.plant] * self.count)
         self.pieces = float(self._equations.pieces.sum())
         self._common = [n for n, c in enumerate(self.columns) if c.effect in self._named]
-        self._own = [n for n, c in enumerate(self.columns) if c.kind != "effect"]
+        self._nuisances = [n for n, c in enumerate(self.columns) if c.kind != "effect"]
 
-    def _stand(self, plants: Sequence[Plant]) -> None:
-        """Takes all responses at these plants, one a recording."""
+    def _linearise(self, plants: Sequence[Plant]) -> None:
+        """Take all responses about these plants, one per recording."""
         self._plants = tuple(plants)
         self._equations = ByRecording.at(self.evidence, self._plants, self.columns)
 
-    def _freedom(self) -> float:
-        return float(BLOCKS - 1)
-
     def differing_zeros(self) -> dict[str, Array]:
-        """Sensors whose zeros differ surely from recording to recording, with how far they are
-        off the mean, in the sensor's unit."""
-        found = {}
-        zeros = [n for n in self._own if self.columns[n].kind == "zero"]
-        for number in zeros:
-            own = [other for other in self._own if other != number]
-            estimate = self._equations.estimate(number, self._common, own)
-            tested = check_homogeneity(estimate.moves, estimate.widths, self._freedom())
-            if tested.probability < self.thresholds.changed:
-                moves = (estimate.moves - tested.mean) * self.columns[number].step
-                found[self.columns[number].group] = moves
-        return found
+        """Return the sensors whose zero surely differs between recordings.
 
-    def compare(self) -> Compared:
-        """Tests every parameter, and follows those that are not the same."""
-        own, found, unseen = list(self._own), [], []
-        candidates = []
+        Returns
+        -------
+        dict
+            Sensor → deviation of its zero from the weighted mean, SI, shape (recordings,).
+        """
+        differing = {}
+        zeros = [n for n in self._nuisances if self.columns[n].kind == "zero"]
+        for number in zeros:
+            nuisances = [n for n in self._nuisances if n != number]
+            estimate = self._equations.estimate(number, self._common, nuisances)
+            test = check_homogeneity(estimate.moves, estimate.widths, FREEDOM)
+            if test.probability < self.thresholds.changed:
+                moves = (estimate.moves - test.mean) * self.columns[number].step
+                differing[self.columns[number].group] = moves
+        return differing
+
+    def compare(self) -> ChangeModel:
+        """Test every parameter, and fit those that differ with a value per recording.
+
+        Returns
+        -------
+        ChangeModel
+            Parameters that changed, and those that did not.
+        """
+        free, changes = list(self._nuisances), []
+        candidates, invisible = self._sort_by_visibility()
+        changed: list[int] = []
+        misfit = self._misfit(self._plants)
+        while len(changed) < self.thresholds.changes:
+            tests = self._test([n for n in candidates if n not in changed], free)
+            # A joint model that leaves a gap may be far off every recording. The linear tests are
+            # then not decisive, and the best candidates are fitted in any case.
+            if (changed or self._settled) and not any(self._is_certain(test) for test in tests):
+                break
+            best, fitted = self._fit_best(tests, free)
+            pieces = float(self._equations.pieces.sum())
+            if best is None or (misfit / best.misfit - 1.0) * pieces <= self.thresholds.instead:
+                break
+            alternatives = [
+                rival.tested.number for rival in fitted if self._is_as_good(rival, best)
+            ]
+            changes.append(self._describe(best.tested, best.values, alternatives))
+            changed.append(best.tested.number)
+            free.append(best.tested.number)
+            misfit = best.misfit
+            self._linearise(best.plants)
+        unchanged = self._describe_unchanged(candidates, invisible, changed, free)
+        names = dict.fromkeys(
+            Name(effect.component, effect.kind.name)
+            for number in invisible
+            if (effect := self.columns[number].effect) is not None and effect not in self._named
+        )
+        return ChangeModel((*changes, *unchanged), tuple(names), len(candidates), misfit)
+
+    def _sort_by_visibility(self) -> tuple[list[int], list[int]]:
+        """Parameters of effects that every recording shows, and those that some do not show."""
+        visible, invisible = [], []
         for number, column in enumerate(self.columns):
             if column.kind != "effect":
                 continue
-            others = [n for n in (*self._common, *own) if n != number]
-            if np.min(self._equations.seen(number, others)) < self.thresholds.seen:
-                unseen.append(number)
-            else:
-                candidates.append(number)
-        changed: list[int] = []
-        left = self._left(self._plants)
-        while len(changed) < self.thresholds.changes:
-            tests = self._test([n for n in candidates if n not in changed], own)
-            # One model for all that leaves a gap may be so far off each that no test there is sure.
-            if (changed or self._settled) and not any(self._is_sure(each) for each in tests):
-                break
-            # What promises most at the plants of before need not be what leaves least.
-            tests.sort(key=lambda each: each.estimate.left)
-            count = len(tests)
-            with Threads() as threads:
-                followed = threads.spread(
-                    lambda each: self._follow(each, own, count),  # noqa: B023
-                    tests[:FOLLOWED],
-                )
-            followed = [each for each in followed if self._is_sure(each.tested)]
-            best = min(followed, key=lambda each: each.left, default=None)
-            pieces = float(self._equations.pieces.sum())
-            if best is None or (left / best.left - 1.0) * pieces <= self.thresholds.instead:
-                break
-            instead = [each.tested.number for each in followed if self._is_as_good(each, best)]
-            found.append(self._describe(best.tested, best.values, instead))
-            changed.append(best.tested.number)
-            own.append(best.tested.number)
-            left = best.left
-            self._stand(best.plants)
-        rest = [n for n in self._common if n in candidates and n not in changed]
-        first = {each.number: each for each in self._test(rest, own)}
-        for number in self._common:
-            if number in changed:
-                continue
-            if number in unseen:
-                found.append(self._untold(number))
-            else:
-                found.append(self._describe(first[number]))
-        names = dict.fromkeys(
-            Name(e.component, e.kind.name)
-            for number in unseen
-            if (e := self.columns[number].effect) is not None and e not in self._named
-        )
-        return Compared(tuple(found), tuple(names), len(candidates), left)
+            nuisances = [n for n in (*self._common, *self._nuisances) if n != number]
+            shares = self._equations.visible_share(number, nuisances)
+            (invisible if np.min(shares) < self.thresholds.seen else visible).append(number)
+        return visible, invisible
 
-    def _test(self, numbers: Sequence[int], own: Sequence[int]) -> list[_Tested]:
-        """Each parameter as the only one that may differ."""
+    def _fit_best(
+        self, tests: list[_TestedParameter], free: Sequence[int]
+    ) -> tuple[_FittedParameter | None, list[_FittedParameter]]:
+        """Fit the most promising parameters; the best one, and all that surely differ."""
+        # The linear prediction only preselects: the order after the fit may be another.
+        tests = sorted(tests, key=lambda test: test.estimate.misfit)
+        count = len(tests)
+        with Threads() as threads:
+            fitted = threads.spread(lambda test: self._fit(test, free, count), tests[:FOLLOWED])
+        fitted = [candidate for candidate in fitted if self._is_certain(candidate.tested)]
+        return min(fitted, key=lambda candidate: candidate.misfit, default=None), fitted
+
+    def _describe_unchanged(
+        self,
+        candidates: Sequence[int],
+        invisible: Sequence[int],
+        changed: Sequence[int],
+        free: Sequence[int],
+    ) -> list[ComparedParameter]:
+        """Parameters of the named effects that did not change or cannot be determined."""
+        testable = [n for n in self._common if n in candidates and n not in changed]
+        tests = {test.number: test for test in self._test(testable, free)}
+        return [
+            self._describe_undetermined(number)
+            if number in invisible
+            else self._describe(tests[number])
+            for number in self._common
+            if number not in changed
+        ]
+
+    def _test(self, numbers: Sequence[int], free: Sequence[int]) -> list[_TestedParameter]:
+        """Test each parameter as the only one that may differ, beside those that are free."""
         estimates = [
             self._equations.estimate(
-                number, [n for n in self._common if n not in (number, *own)], own
+                number, [n for n in self._common if n not in (number, *free)], free
             )
             for number in numbers
         ]
-        tests = [check_homogeneity(each.moves, each.widths, self._freedom()) for each in estimates]
+        tests = [check_homogeneity(each.moves, each.widths, FREEDOM) for each in estimates]
         return [
-            _Tested(number, estimate, test.statistic, probability, self._nothing(own, number))
+            _TestedParameter(
+                number, estimate, test.statistic, probability, self._misfit_if_same(free, number)
+            )
             for number, estimate, test, probability in zip(
                 numbers, estimates, tests, correct([t.probability for t in tests]), strict=True
             )
         ]
 
-    def _nothing(self, own: Sequence[int], also: int | None = None) -> float:
-        """χ² that stays if nothing more changed; also: a further parameter in common."""
-        common = [n for n in self._common if n not in own]
-        if also is not None and also not in common:
-            common.append(also)
-        return self._equations.estimate(None, common, own).left
+    def _misfit_if_same(self, free: Sequence[int], number: int) -> float:
+        """χ² that remains if a parameter has one value for all recordings."""
+        common = [n for n in self._common if n not in free]
+        if number not in common:
+            common.append(number)
+        return self._equations.estimate(None, common, free).misfit
 
-    def _matters(self, each: _Tested) -> bool:
-        """Whether a change lessens the error enough, where more than noise is left."""
+    def _is_material(self, test: _TestedParameter) -> bool:
+        """Return whether a change lowers the error noticeably, where more than noise remains.
+
+        A rough model's error is no noise, so a test may be sure of a trifle. The gain is the
+        logarithm of the ratio of rms residuals, 0.5 ln(χ²_same / χ²_different).
+        """
         if self._settled:
             return True
-        gain = 0.5 * float(np.log(each.without / max(each.estimate.left, 1e-300)))
+        gain = 0.5 * float(np.log(test.without / max(test.estimate.misfit, 1e-300)))
         return gain >= self.thresholds.changed_share
 
-    def _is_sure(self, each: _Tested) -> bool:
-        """Whether a parameter is not the same, and that is no trifle beside a model's error."""
-        return each.probability < self.thresholds.changed and self._matters(each)
+    def _is_certain(self, test: _TestedParameter) -> bool:
+        """Return whether a parameter surely differs, by a noticeable amount."""
+        return test.probability < self.thresholds.changed and self._is_material(test)
 
-    def _is_as_good(self, each: _Followed, best: _Followed) -> bool:
-        """Whether another parameter's change leaves as little as the best one's."""
-        if each is best:
+    def _is_as_good(self, rival: _FittedParameter, best: _FittedParameter) -> bool:
+        """Return whether the change of another parameter explains as much as the best one."""
+        if rival is best:
             return False
-        share = each.left / max(best.left, 1e-300)
-        alike = 0.0 if self._settled else self.thresholds.changed_share
+        ratio = rival.misfit / max(best.misfit, 1e-300)
+        margin = 0.0 if self._settled else self.thresholds.changed_share
         pieces = float(self._equations.pieces.sum())
-        return 0.5 * np.log(share) <= alike or (share - 1.0) * pieces <= self.thresholds.instead
+        return 0.5 * np.log(ratio) <= margin or (ratio - 1.0) * pieces <= self.thresholds.instead
 
     def _describe(
-        self, each: _Tested, followed: Array | None = None, instead: Sequence[int] = ()
-    ) -> Parameter:
-        """followed: values of a parameter that is not the same; instead: columns whose change
-        explains as much."""
-        column = self.columns[each.number]
+        self,
+        test: _TestedParameter,
+        fitted: Array | None = None,
+        alternatives: Sequence[int] = (),
+    ) -> ComparedParameter:
+        """Describe a parameter.
+
+        fitted: values of a parameter that differs, SI, shape (recordings,); None for one that does
+        not; alternatives: parameters whose change explains as much.
+        """
+        column = self.columns[test.number]
         effect = column.effect
         assert effect is not None
-        estimate = each.estimate
-        values = followed
+        estimate = test.estimate
+        values = fitted
         if values is None:
             values = self._values(column, self._plants) + estimate.moves * column.step
-        widths = estimate.widths * abs(column.step) * self.thresholds.wider
-        quantity = effect.quantities()[column.parameter]
-        return Parameter(
+        half_widths = estimate.widths * abs(column.step) * self.thresholds.wider
+        rivals = (self.columns[number].effect for number in alternatives)
+        return ComparedParameter(
             name=Name(effect.component, effect.kind.name),
             parameter=column.parameter,
-            unit=self.machine.unit(column.group, quantity),
+            unit=self.machine.unit(column.group, effect.quantities()[column.parameter]),
             values=tuple(
-                Interval(float(v), float(v - w), float(v + w))
-                for v, w in zip(values, widths, strict=True)
+                Interval(float(value), float(value - half), float(value + half))
+                for value, half in zip(values, half_widths, strict=True)
             ),
-            statistic=each.statistic,
-            probability=each.probability,
-            verdict="same" if followed is None else "changed",
-            instead=tuple(
+            statistic=test.statistic,
+            probability=test.probability,
+            verdict="same" if fitted is None else "changed",
+            alternatives=tuple(
                 dict.fromkeys(
-                    Name(e.component, e.kind.name)
-                    for n in instead
-                    if (e := self.columns[n].effect) is not None and e != effect
+                    Name(rival.component, rival.kind.name)
+                    for rival in rivals
+                    if rival is not None and rival != effect
                 )
             ),
         )
 
     @staticmethod
-    def _values(column: Column, plants: Sequence[Plant]) -> Array:
-        return np.array([getattr(getattr(p, column.group), column.parameter) for p in plants])
+    def _values(column: FreeParameter, plants: Sequence[Plant]) -> Array:
+        return np.array([column.value_in(plant) for plant in plants])
 
-    def _follow(self, tested: _Tested, own: Sequence[int], count: int) -> _Followed:
-        """A parameter of each recording, responses taken anew at its values as long as that lessens
-        what is left. count: parameters that are tested beside each other."""
-        number = tested.number
-        shared = [n for n in self._common if n != number and n not in own]
-        chosen = [self.columns[n] for n in (number, *shared, *own)]
+    def _fit(self, test: _TestedParameter, free: Sequence[int], count: int) -> _FittedParameter:
+        """Fit a parameter with a value per recording by Gauss-Newton.
+
+        count: number of parameters tested at once, for Bonferroni's correction of the p-value.
+        """
+        number = test.number
+        shared = [n for n in self._common if n != number and n not in free]
+        chosen = [self.columns[n] for n in (number, *shared, *free)]
         common = range(1, 1 + len(shared))
         nuisances = range(1 + len(shared), len(chosen))
         plants = list(self._plants)
-        here = self._left(plants)
+        misfit = self._misfit(plants)
         for _ in range(ROUNDS):
-            found = ByRecording.at(self.evidence, plants, chosen).estimate(0, common, nuisances)
-            for part in PARTS:
-                there = [
-                    reduce(
-                        lambda plant, step: step[0].moved(plant, part * float(step[1])),
-                        zip(chosen, (move, *found.common), strict=False),
-                        plant,
-                    )
-                    for plant, move in zip(plants, found.moves, strict=True)
+            estimate = ByRecording.at(self.evidence, plants, chosen).estimate(0, common, nuisances)
+            for share in STEP_SHARES:
+                trial = [
+                    _shift_plant(plant, chosen, share * np.array([move, *estimate.common]))
+                    for plant, move in zip(plants, estimate.moves, strict=True)
                 ]
-                if (left := self._left(there)) < here:
+                if (trial_misfit := self._misfit(trial)) < misfit:
                     break
             else:
+                # No share of the step lowers χ²: the linear model is exhausted.
                 break
-            gained, plants, here = here - left, there, left
-            if gained < SMALL * here:
+            gained, plants, misfit = misfit - trial_misfit, trial, trial_misfit
+            if gained < CONVERGED * misfit:
                 break
+        # The errors and the test are taken anew at the fitted values.
         values = self._values(chosen[0], plants)
         last = ByRecording.at(self.evidence, plants, chosen).estimate(0, common, nuisances)
-        widths = last.widths * abs(chosen[0].step)
-        test = check_homogeneity(values, widths, self._freedom())
-        anew = replace(
-            tested,
-            estimate=replace(tested.estimate, widths=last.widths),
-            statistic=test.statistic,
-            probability=min(count * test.probability, 1.0),
+        homogeneity = check_homogeneity(values, last.widths * abs(chosen[0].step), FREEDOM)
+        refined = replace(
+            test,
+            estimate=replace(test.estimate, widths=last.widths),
+            statistic=homogeneity.statistic,
+            probability=min(count * homogeneity.probability, 1.0),
         )
-        return _Followed(anew, values, here, tuple(plants))
+        return _FittedParameter(refined, values, misfit, tuple(plants))
 
-    def _left(self, plants: Sequence[Plant]) -> float:
-        """χ² that plants leave, zeros and tolerances taken up."""
-        nuisances = [self.columns[n] for n in self._own]
-        found = ByRecording.at(self.evidence, plants, nuisances, relative=False)
-        return found.estimate(None, (), range(len(nuisances))).left
+    def _misfit(self, plants: Sequence[Plant]) -> float:
+        """χ² that plants leave after zeros and tolerances are fitted."""
+        nuisances = [self.columns[n] for n in self._nuisances]
+        equations = ByRecording.at(self.evidence, plants, nuisances, relative=False)
+        return equations.estimate(None, (), range(len(nuisances))).misfit
 
-    def _untold(self, number: int) -> Parameter:
+    def _describe_undetermined(self, number: int) -> ComparedParameter:
         column = self.columns[number]
         assert column.effect is not None
         quantity = column.effect.quantities()[column.parameter]
-        return Parameter(
+        return ComparedParameter(
             name=Name(column.effect.component, column.effect.kind.name),
             parameter=column.parameter,
             unit=self.machine.unit(column.group, quantity),
@@ -311,5 +427,14 @@ class ChangeSearch:
             statistic=float("nan"),
             probability=float("nan"),
             verdict="cannot tell",
-            why="not every recording shows it apart from zeros, tolerances and what else is named",
+            why="not every recording distinguishes it from zeros, tolerances and other effects",
         )
+
+
+def _shift_plant(plant: Plant, columns: Sequence[FreeParameter], steps: Array) -> Plant:
+    """Plant with the first columns shifted by their steps; the nuisances after them stay."""
+    return reduce(
+        lambda shifted, step: step[0].shift(shifted, float(step[1])),
+        zip(columns, steps, strict=False),
+        plant,
+    )

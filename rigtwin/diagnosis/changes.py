@@ -1,11 +1,14 @@
-"""What several recordings of one machine say together: whether each parameter has one value in all
-of them, and where it has not, what the change goes with."""
+"""Compare several recordings of one machine: which parameters changed, and what the change follows.
+
+joint diagnosis → zeros of sensors subtracted → search for parameters that differ → trends.
+"""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -13,13 +16,13 @@ from threadpoolctl import threadpool_limits
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Machine
 from rigtwin.diagnosis.by_recording import BLOCKS
-from rigtwin.diagnosis.change import Changes, Parameter
-from rigtwin.diagnosis.change_columns import sensors_of
-from rigtwin.diagnosis.change_search import ChangeSearch
+from rigtwin.diagnosis.change import Changes, ComparedParameter
+from rigtwin.diagnosis.change_search import ChangeModel, ChangeSearch
 from rigtwin.diagnosis.changes_text import change_sentence
 from rigtwin.diagnosis.diagnose import diagnose
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.homogeneity import fit_trends, name_trends
+from rigtwin.diagnosis.result import Diagnosis
 from rigtwin.diagnosis.thresholds import STANDARD, Thresholds
 from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
@@ -33,90 +36,124 @@ def find_changes(
     progress: Callable[[str, int], object] = lambda _stage, _steps: None,
     thresholds: Thresholds = STANDARD,
 ) -> Changes:
-    """Says what changed between recordings of one machine.
+    """Find what changed between recordings of one machine.
 
     Parameters
     ----------
     machine
-        Its description.
+        Machine that was recorded.
     recordings
-        In the order of time.
+        Recordings in the order of time, two or more.
     base
-        The twin that they are compared with; by default the described one.
+        Twin that they are compared with. Defaults to the described one.
     progress
-        Called with a stage's name and the steps done in it.
+        Called with the name of a stage and the number of steps done in it.
     thresholds
-        What figures are held against.
+        Thresholds of the diagnosis and the comparison.
 
     Returns
     -------
     Changes
-        Each parameter in each recording, and which are not the same.
+        Value of each parameter in each recording, and which parameters differ.
 
     Raises
     ------
     RigtwinError
-        For fewer than two recordings, or data that cannot be diagnosed.
+        If there are fewer than two recordings, or they cannot be diagnosed.
     """
-    began = time.perf_counter()
+    started = time.perf_counter()
     if len(recordings) < 2:
-        raise RigtwinError("what changed is a question to two recordings or more; one was given")
-    aligned = list(recordings)
-    total = {name: np.zeros(len(recordings)) for name in sensors_of(machine)}
+        raise RigtwinError("what changed: expected at least two recordings, got one")
 
-    def look(at: Sequence[Recording]) -> ChangeSearch:
-        together = diagnose(machine, at, base, progress=progress, thresholds=thresholds)
-        progress("comparing recordings", 1)
-        return ChangeSearch(together, thresholds)
+    diagnose_set = partial(diagnose, machine, base=base, progress=progress, thresholds=thresholds)
 
+    # BLAS threads would compete with the threads of the search.
     with threadpool_limits(1):
-        search = look(aligned)
-        if zeros := search.differing_zeros():
-            for name, values in zeros.items():
-                total[name] += values
-            aligned = [
-                _shift(machine, recording, {name: values[n] for name, values in zeros.items()})
-                for n, recording in enumerate(aligned)
-            ]
-            search = look(aligned)
-        compared = search.compare()
-        if search.together.verdict not in ("no gap", "explained") or any(
-            each.verdict == "changed" for each in compared.parameters
-        ):
-            # What changed much leaves a model for all that is that of none: one recording's own
-            # explanation is a better place to start from.
-            for recording in (aligned[0], aligned[-1]):
-                alone = diagnose(
-                    machine, [recording], base, progress=progress, thresholds=thresholds
-                )
-                if alone.evidence is not None and alone.effects:
-                    other = ChangeSearch(search.together, thresholds, start=alone).compare()
-                    compared = min(
-                        compared,
-                        other,
-                        key=lambda each: each.cost(search.pieces, thresholds.instead),
-                    )
+        aligned, zeros, search = _align_zeros(
+            machine, recordings, diagnose_set, progress, thresholds
+        )
+        model = search.compare()
+        has_change = any(parameter.verdict == "changed" for parameter in model.parameters)
+        if has_change or search.together.verdict not in ("no gap", "explained"):
+            model = _restart(model, search, (aligned[0], aligned[-1]), diagnose_set, thresholds)
     covariates = _covariates(search.evidence)
-    parameters = tuple(_with_trends(each, covariates, thresholds) for each in compared.parameters)
+    # Trends are fitted last: they describe a change, and do not decide whether there is one.
+    parameters = tuple(
+        _with_trends(parameter, covariates, thresholds) for parameter in model.parameters
+    )
     return Changes(
         recordings=tuple(str(recording.path) for recording in recordings),
         sentence=change_sentence(parameters),
         parameters=parameters,
-        unseen=compared.unseen,
-        zeros={
-            name: tuple((values - values.mean()).tolist())
-            for name, values in total.items()
-            if values.any()
-        },
+        undetermined=model.undetermined,
+        zeros=zeros,
         covariates={name: tuple(values.tolist()) for name, values in covariates.items()},
-        tested=compared.tested,
-        seconds=time.perf_counter() - began,
+        tested=model.tested,
+        seconds=time.perf_counter() - started,
         together=search.together,
     )
 
 
-def _shift(machine: Machine, recording: Recording, zeros: dict[str, float]) -> Recording:
-    """The recording with sensors' zeros taken off."""
+def _align_zeros(
+    machine: Machine,
+    recordings: Sequence[Recording],
+    diagnose_set: Callable[[Sequence[Recording]], Diagnosis],
+    progress: Callable[[str, int], object],
+    thresholds: Thresholds,
+) -> tuple[list[Recording], dict[str, tuple[float, ...]], ChangeSearch]:
+    """Subtract zeros of sensors that differ between recordings, and diagnose what results.
+
+    Returns the recordings, the zeros about their mean by sensor, and the search prepared on the
+    joint diagnosis.
+    """
+    aligned = list(recordings)
+    search = ChangeSearch(diagnose_set(aligned), thresholds)
+    progress("comparing recordings", 1)
+    differing = search.differing_zeros()
+    if differing:
+        aligned = [
+            _subtract_zeros(
+                machine, recording, {name: values[n] for name, values in differing.items()}
+            )
+            for n, recording in enumerate(aligned)
+        ]
+        search = ChangeSearch(diagnose_set(aligned), thresholds)
+        progress("comparing recordings", 1)
+    zeros = {
+        name: tuple((values - values.mean()).tolist())
+        for name, values in differing.items()
+        if values.any()
+    }
+    return aligned, zeros, search
+
+
+def _restart(
+    model: ChangeModel,
+    search: ChangeSearch,
+    starts: Sequence[Recording],
+    diagnose_set: Callable[[Sequence[Recording]], Diagnosis],
+    thresholds: Thresholds,
+) -> ChangeModel:
+    """Search again from the diagnoses of single recordings, and return the best model.
+
+    After a large change the joint model fits none of the recordings, so the linearisation about it
+    is poor. The explanation of one recording alone is a better start.
+    """
+    for recording in starts:
+        alone = diagnose_set([recording])
+        if alone.evidence is None or not alone.effects:
+            continue
+        restarted = ChangeSearch(search.together, thresholds, start=alone).compare()
+        model = min(
+            model,
+            restarted,
+            key=lambda candidate: candidate.cost(search.pieces, thresholds.instead),
+        )
+    return model
+
+
+def _subtract_zeros(machine: Machine, recording: Recording, zeros: dict[str, float]) -> Recording:
+    """Recording with the zeros of sensors, SI, subtracted from their signals."""
     columns = {topic: dict(names) for topic, names in recording.columns.items()}
     for name, zero in zeros.items():
         channel = machine.components[name].channel
@@ -126,42 +163,49 @@ def _shift(machine: Machine, recording: Recording, zeros: dict[str, float]) -> R
 
 
 def _covariates(evidence: Evidence) -> dict[str, Array]:
-    """What a change may go with: quantity → its value in each recording."""
+    """Quantities that a change may follow, with their value in each recording.
+
+    They are the order of recording, every channel with "temp" in its name, and the amplitude of
+    motion and force of the first joint.
+    """
     count = len(evidence.recordings)
-    found = {"time (order of recording)": np.arange(1.0, count + 1.0)}
+    covariates = {"time (order of recording)": np.arange(1.0, count + 1.0)}
     shared = set.intersection(
         *(
-            {(t, n) for t, names in recording.columns.items() for n in names}
+            {(topic, name) for topic, names in recording.columns.items() for name in names}
             for recording in evidence.recordings
         )
     )
     for topic, name in sorted(shared):
         if "temp" in name.lower():
-            found[f"temperature ({topic}.{name})"] = np.array(
+            covariates[f"temperature ({topic}.{name})"] = np.array(
                 [float(np.mean(r.column(topic, name))) for r in evidence.recordings]
             )
-    moved = next(iter(evidence.machine.replays)).guide if evidence.machine.replays else None
-    component = moved or next(iter(evidence.models[0].components()), None)
+    first_joint = next(iter(evidence.machine.replays)).guide if evidence.machine.replays else None
+    component = first_joint or next(iter(evidence.models[0].components()), None)
     if component is not None:
         motions = [model.motion(component, evidence.plant) for model in evidence.models]
-        found["amplitude (rms of motion)"] = np.array(
+        covariates["amplitude (rms of motion)"] = np.array(
             [float(np.std(motion.position)) for motion in motions]
         )
-        found["load (rms of force)"] = np.array(
+        covariates["load (rms of force)"] = np.array(
             [float(np.sqrt(np.mean(motion.force**2))) for motion in motions]
         )
-    return {name: values for name, values in found.items() if np.isfinite(values).all()}
+    # A temperature that a recording lacks in part is NaN.
+    return {name: values for name, values in covariates.items() if np.isfinite(values).all()}
 
 
 def _with_trends(
-    each: Parameter, covariates: dict[str, Array], thresholds: Thresholds
-) -> Parameter:
-    if each.verdict != "changed":
-        return each
-    values = np.array([interval.value for interval in each.values])
-    widths = np.array([0.5 * (interval.high - interval.low) for interval in each.values])
-    trends = fit_trends(values, widths / thresholds.wider, covariates, float(BLOCKS - 1))
+    parameter: ComparedParameter, covariates: dict[str, Array], thresholds: Thresholds
+) -> ComparedParameter:
+    """Add the trends of a parameter that changed."""
+    if parameter.verdict != "changed":
+        return parameter
+    values = np.array([interval.value for interval in parameter.values])
+    half_widths = np.array([0.5 * (interval.high - interval.low) for interval in parameter.values])
+    # The fit weighs by standard errors, of which an interval spans `wider` to either side.
+    trends = fit_trends(values, half_widths / thresholds.wider, covariates, float(BLOCKS - 1))
     rivals, named = name_trends(
         trends, len(values), thresholds.trend_explains, thresholds.trend_clear
     )
-    return replace(each, trends=rivals, named=named)
+    return replace(parameter, trends=rivals, named=named)

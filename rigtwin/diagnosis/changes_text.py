@@ -1,62 +1,71 @@
-"""What changed between recordings, in words: a sentence, and a compact table for a terminal."""
+"""Changes between recordings in words: one sentence, and a compact table for a terminal."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
 
-from rigtwin.diagnosis.change import Changes, Parameter
-from rigtwin.diagnosis.finding import Interval
+from rigtwin.diagnosis.change import Changes, ComparedParameter
+from rigtwin.diagnosis.units import shorten, spell
 
-SAID = {"same": "the same", "changed": "changed", "cannot tell": "cannot tell"}
+ANSWERS = {"same": "the same", "changed": "changed", "cannot tell": "not determined"}
+TABLE_NOTE = (
+    "each value ± 2.5 standard errors (docs/confidence.md); "
+    "p: probability of such differences if nothing changed"
+)
 
 
 def describe_changes(changes: Changes) -> str:
-    """The sentence, a row for each parameter, and what nobody can tell.
+    """Write the sentence, a row for each parameter, and what the recordings do not determine.
 
     Parameters
     ----------
     changes
-        What was found.
+        Result of the comparison.
 
     Returns
     -------
     str
-        Lines.
+        Lines for a terminal. All values of a row have the unit of that row.
     """
-    names = [Path(each).name for each in changes.recordings]
+    names = [Path(recording).name for recording in changes.recordings]
     rows = [("parameter", "unit", *names, "", "p")]
-    for each in changes.parameters:
-        values = [_value(own) for own in each.values] or ["-"] * len(names)
-        chance = f"{each.probability:.2g}" if each.values else "-"
-        rows.append(
-            (f"{each.name} {each.parameter}", each.unit, *values, SAID[each.verdict], chance)
-        )
+    rows += [_row(parameter, len(names)) for parameter in changes.parameters]
     lines = [changes.sentence]
     if changes.parameters:
-        lines += [f"  {line}" for line in _aligned(rows)]
-        lines.append("  each with its 95 % interval; p: of such differences if nothing changed")
+        lines += [f"  {line}" for line in _align(rows)]
+        lines.append(f"  {TABLE_NOTE}")
     for name, zeros in changes.zeros.items():
         values = ", ".join(f"{value:+.3g}" for value in zeros)
-        lines.append(f"  zero of {name}: {values} off the mean, which is no change of the machine")
-    for each in changes.changed:
-        for trend in each.trends:
+        lines.append(
+            f"  zero of {name}, deviation from the mean: {values}; no change of the machine"
+        )
+    for parameter in changes.changed:
+        for trend in parameter.trends:
             lines.append(
-                f"  {each.name} with {trend.name}: explains {100 * trend.explains:.0f} % of the "
-                f"differences, {trend.slope:.3g} per unit"
+                f"  {parameter.name} against {trend.name}: a straight line explains "
+                f"{100 * trend.explains:.0f} % of the differences, {trend.slope:.3g} per unit"
             )
-    if changes.unseen:
-        names = ", ".join(map(str, changes.unseen))
-        lines.append(f"  cannot tell from these whether it changed: {names}")
+    if changes.undetermined:
+        listed = ", ".join(map(str, changes.undetermined))
+        lines.append(f"  a change of these would not show in the recordings: {listed}")
     lines.append(f"  {changes.tested} parameters tested, {changes.seconds:.1f} s")
     return "\n".join(lines)
 
 
-def _value(own: Interval) -> str:
-    return f"{own.value:.4g} ± {0.5 * (own.high - own.low):.2g}"
+def _row(parameter: ComparedParameter, recordings: int) -> tuple[str, ...]:
+    factor, unit = shorten(parameter.unit, *(interval.value for interval in parameter.values))
+    values = [
+        f"{spell(factor * interval.value, 4)} ± "
+        f"{spell(factor * 0.5 * (interval.high - interval.low), 2)}"
+        for interval in parameter.values
+    ] or ["-"] * recordings
+    probability = f"{parameter.probability:.2g}" if parameter.values else "-"
+    title = f"{parameter.name} {parameter.parameter}"
+    return (title, unit or "1", *values, ANSWERS[parameter.verdict], probability)
 
 
-def _aligned(rows: Sequence[tuple[str, ...]]) -> list[str]:
+def _align(rows: Sequence[tuple[str, ...]]) -> list[str]:
     widths = [max(len(cell) for cell in column) for column in zip(*rows, strict=True)]
     return [
         "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
@@ -64,27 +73,48 @@ def _aligned(rows: Sequence[tuple[str, ...]]) -> list[str]:
     ]
 
 
-def change_sentence(parameters: Sequence[Parameter]) -> str:
-    """What changed, in one sentence."""
-    changed = [each for each in parameters if each.verdict == "changed"]
+def change_sentence(parameters: Sequence[ComparedParameter]) -> str:
+    """Write what changed in one sentence.
+
+    Parameters
+    ----------
+    parameters
+        Parameters of the comparison.
+
+    Returns
+    -------
+    str
+        One line that ends with a full stop.
+    """
+    changed = [parameter for parameter in parameters if parameter.verdict == "changed"]
     if not changed:
-        untold = [each for each in parameters if each.verdict == "cannot tell"]
-        but = f"; of {len(untold)} that are named these cannot tell" if untold else ""
-        return f"No change: one value of every parameter does for all recordings{but}."
-    parts = []
-    for each in changed:
-        values = " to ".join(
-            f"{value:.4g}" for value in (each.values[0].value, each.values[-1].value)
+        undetermined = sum(parameter.verdict == "cannot tell" for parameter in parameters)
+        but = (
+            f"; the recordings do not determine {undetermined} of the named parameters"
+            if undetermined
+            else ""
         )
-        unit = "" if each.unit == "1" else f" {each.unit}"
-        others = f", or else {', '.join(map(str, each.instead))}" if each.instead else ""
-        parts.append(f"{each.name} ({each.parameter} {values}{unit}{others}){_goes_with(each)}")
+        return f"No change: one value of every parameter fits all recordings{but}."
+    parts = []
+    for parameter in changed:
+        first, last = parameter.values[0].value, parameter.values[-1].value
+        factor, shown = shorten(parameter.unit, first, last)
+        values = f"{spell(factor * first, 4)} to {spell(factor * last, 4)}"
+        unit = f" {shown}" if shown else ""
+        alternatives = ", ".join(map(str, parameter.alternatives))
+        rivals = f", or instead {alternatives}" if alternatives else ""
+        parts.append(
+            f"{parameter.name} ({parameter.parameter} {values}{unit}{rivals})"
+            f"{_describe_trend(parameter)}"
+        )
     return f"Not the same in all recordings: {'; '.join(parts)}."
 
 
-def _goes_with(each: Parameter) -> str:
-    if not each.trends:
-        return ", with nothing that was recorded" if len(each.values) > 2 else ""
-    if each.named:
-        return f", it goes with {each.trends[0].name}"
-    return f", with {' or '.join(trend.name for trend in each.trends)}: these cannot tell which"
+def _describe_trend(parameter: ComparedParameter) -> str:
+    if not parameter.trends:
+        # Two recordings differ in every quantity, so only more of them can exclude all.
+        return ", following no recorded quantity" if len(parameter.values) > 2 else ""
+    if parameter.named:
+        return f", following the {parameter.trends[0].name}"
+    names = " or ".join(trend.name for trend in parameter.trends)
+    return f", following {names}: the recordings cannot distinguish these"

@@ -1,14 +1,14 @@
-"""The diagnosis: recordings in, one answer out.
+"""Diagnose why recordings and the twin disagree: recordings in, one answer out.
 
-checks → evidence → attribution (replays of the whole plant) and what needs no model (controller,
-sensors' sampling) → where → judged on held-out data → the next test.
+data checks → evidence (residuals) → search for effects → validation on held-out data → location of
+the residual → properties read off signals (controller, sensors) → next test → answer.
 """
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from threadpoolctl import threadpool_limits
 
@@ -35,12 +35,12 @@ from rigtwin.diagnosis.findings import (
     choose_named,
     describe_attributed,
     describe_controller,
+    describe_negligible,
     describe_sensor,
-    describe_slight,
     find_nearest,
     find_traces,
     list_unobservable,
-    supports,
+    measure_support,
 )
 from rigtwin.diagnosis.first_look import FirstLook
 from rigtwin.diagnosis.fit import Fit
@@ -48,18 +48,79 @@ from rigtwin.diagnosis.join import join
 from rigtwin.diagnosis.leftover import leftovers, steps
 from rigtwin.diagnosis.localisation import locate
 from rigtwin.diagnosis.next_test import propose_test
+from rigtwin.diagnosis.regressors import describe_correlation
 from rigtwin.diagnosis.result import Diagnosis
 from rigtwin.diagnosis.sampling import SensorProperty, find_outstanding
 from rigtwin.diagnosis.short_recordings import drop_short, least_ticks
 from rigtwin.diagnosis.stops import find_cut_commands, find_stops
+from rigtwin.diagnosis.support import Support
 from rigtwin.diagnosis.text import sentence
 from rigtwin.diagnosis.thresholds import STANDARD, Thresholds
 from rigtwin.diagnosis.unknown_input import DisturbanceFit, locate_disturbance
-from rigtwin.diagnosis.words import enumerate_words
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
 from rigtwin.simulation.energy import EnergyError
 from rigtwin.simulation.experiment import Experiment
+
+RANKED = 8
+"""Explanations in the ranking of an answer."""
+SEPARATED = 4
+"""Explanations that a next test should separate at most."""
+
+
+@dataclass(frozen=True)
+class _Judged:
+    """Effects that are named, and what the correction by them leaves.
+
+    Attributes
+    ----------
+    explanation
+        Result of the search.
+    support
+        Support of each effect of the best hypothesis.
+    validation
+        Validation of the chosen effects on held-out data.
+    named
+        Effects that survive the validation.
+    has_residual
+        Whether more than noise and declared error remains.
+    plant
+        Plant with the named effects.
+    notes
+        Reasons why chosen effects are not named.
+    """
+
+    explanation: Explanation
+    support: dict[Effect, Support]
+    validation: Validation
+    named: tuple[Effect, ...]
+    has_residual: bool
+    plant: Plant
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class _Readings:
+    """Deviations that are read off signals, without a model of the mechanics.
+
+    Attributes
+    ----------
+    sampled
+        Properties of sensors that differ from the description.
+    deviations
+        Deviations of the controller from its settings.
+    negligible
+        Deviations of the controller that are too small to cause a gap.
+    """
+
+    sampled: tuple[SensorProperty, ...]
+    deviations: tuple[Deviation, ...]
+    negligible: tuple[Deviation, ...]
+
+    @property
+    def has_unknown_controller(self) -> bool:
+        """Whether no setting reproduces the controller's commands."""
+        return any(deviation.kind == "unknown" for deviation in self.deviations)
 
 
 def _answer_unusable(
@@ -68,7 +129,7 @@ def _answer_unusable(
     configurations: Sequence[Configuration],
     started: float,
 ) -> Answer | None:
-    """The answer if some data are not fit to be diagnosed, else None."""
+    """Answer for recordings with a fault that forbids a diagnosis; None where there is none."""
     faults = [
         f"{recording.path}: {fault.message}"
         for recording, configuration in zip(recordings, configurations, strict=True)
@@ -86,14 +147,14 @@ def _answer_unusable(
         verdict="unusable",
         sentence=f"The data cannot be diagnosed: {faults[0]}.",
         faults=tuple(faults),
-        notes=_notes(recordings),
+        notes=_recording_notes(recordings),
         recordings=tuple(str(recording.path) for recording in recordings),
         seconds=time.perf_counter() - started,
         machine=machine.name,
     )
 
 
-def _notes(recordings: Sequence[Recording]) -> tuple[str, ...]:
+def _recording_notes(recordings: Sequence[Recording]) -> tuple[str, ...]:
     return tuple(
         f"{recording.path.name}: {note}" for recording in recordings for note in recording.notes
     )
@@ -109,28 +170,28 @@ def diagnose(
     thresholds: Thresholds = STANDARD,
     first_look: Callable[[FirstLook], object] = lambda _: None,
 ) -> Diagnosis:
-    """Says why recordings of one machine and its twin disagree.
+    """Find out why recordings of one machine and its twin disagree.
 
     Parameters
     ----------
     machine
-        Its description.
+        Machine that was recorded.
     recordings
-        Explained together.
+        Recordings fitted jointly.
     base
-        The twin that they are compared with; by default the described one.
+        Twin that they are compared with. Defaults to the described one.
     held_out
-        Recordings that the correction is judged on; without any, each half of the others on a fit
-        to the other half.
+        Recordings that judge the correction and are not fitted. Without any, blocks of the fitted
+        recordings are left out in turn.
     tests
-        The menu that a next test is chosen from.
+        Menu of experiments from which the next test is chosen.
     progress
-        Called with a stage's name and the steps done in it.
+        Called with the name of a stage and the number of steps done in it.
     thresholds
-        What the stages hold their figures against.
+        Thresholds of all stages.
     first_look
-        Called as soon as every effect has been tried: what the gap is, and its suspects; of a
-        machine of several joints that do not act on each other, once for each.
+        Called with the gap and its suspects once every effect was tried. For a machine of several
+        joints that do not act on each other it is called once per joint.
 
     Returns
     -------
@@ -140,8 +201,8 @@ def diagnose(
     Raises
     ------
     RigtwinError
-        If the recordings' settings are unknown here, or held-out data are not fit to be compared or
-        the same as those of the fit.
+        If the settings of a recording are unknown, or held-out recordings are unusable or hold the
+        same data as fitted ones.
     """
     started = time.perf_counter()
     recordings, notes = drop_copies(recordings)
@@ -149,13 +210,13 @@ def diagnose(
     recordings, short = drop_short(recordings)
     held_out, short_held_out = drop_short(held_out)
     notes += [*short, *short_held_out]
+    # BLAS threads would compete with the threads of the search.
     with threadpool_limits(1):
         configurations = [machine.configuration_of(recording, base) for recording in recordings]
-        if (bad := _answer_unusable(machine, recordings, configurations, started)) is not None:
-            return Diagnosis(bad, machine, None, configurations[0])
-        others = [machine.configuration_of(recording, base) for recording in held_out]
-        for recording, configuration in zip(held_out, others, strict=True):
-            require_fit(machine, recording, configuration, least_ticks(held_out))
+        unusable = _answer_unusable(machine, recordings, configurations, started)
+        if unusable is not None:
+            return Diagnosis(unusable, machine, None, configurations[0])
+        judging_configurations = _configure_held_out(machine, held_out, base)
 
         notes += [
             f"{recording.path.name}: {line}"
@@ -163,25 +224,29 @@ def diagnose(
             for line in find_contacts(machine, recording)
         ]
 
-        def diagnose_part(part: Machine) -> Diagnosis:
-            evidence = Evidence(part, recordings, configurations)
-            apart = Evidence(part, held_out, others) if held_out else None
-            return _diagnose(
-                evidence=evidence,
-                held_out=apart,
-                tests=tests,
-                progress=progress,
-                first_look=first_look,
-                thresholds=thresholds,
-                started=started,
-            )
+        def evidence_of(part: Machine) -> tuple[Evidence, Evidence | None]:
+            judging = Evidence(part, held_out, judging_configurations) if held_out else None
+            return Evidence(part, recordings, configurations), judging
 
-        found = [diagnose_part(part) for part in machine.physics.split(machine)]
-        if len(found) == 1:
-            return _with_notes(found[0], notes)
-        apart = Evidence(machine, held_out, others) if held_out else None
-        joined = join(Evidence(machine, recordings, configurations), apart, found, started)
-        return _with_notes(joined, notes)
+        # Joints that do not act on each other are diagnosed one by one: their effects cannot be
+        # confounded, and the search is much smaller.
+        parts = [
+            _diagnose_part(*evidence_of(part), tests, progress, first_look, thresholds, started)
+            for part in machine.physics.split(machine)
+        ]
+        if len(parts) == 1:
+            return _with_notes(parts[0], notes)
+        return _with_notes(join(*evidence_of(machine), parts, started), notes)
+
+
+def _configure_held_out(
+    machine: Machine, held_out: Sequence[Recording], base: Configuration | None
+) -> list[Configuration]:
+    """Settings of the held-out recordings; raises where one of them cannot be compared."""
+    configurations = [machine.configuration_of(recording, base) for recording in held_out]
+    for recording, configuration in zip(held_out, configurations, strict=True):
+        require_fit(machine, recording, configuration, least_ticks(held_out))
+    return configurations
 
 
 def _with_notes(diagnosis: Diagnosis, notes: Sequence[str]) -> Diagnosis:
@@ -189,7 +254,7 @@ def _with_notes(diagnosis: Diagnosis, notes: Sequence[str]) -> Diagnosis:
     return replace(diagnosis, answer=answer)
 
 
-def _diagnose(
+def _diagnose_part(
     evidence: Evidence,
     held_out: Evidence | None,
     tests: Sequence[Experiment],
@@ -198,130 +263,167 @@ def _diagnose(
     thresholds: Thresholds,
     started: float,
 ) -> Diagnosis:
-    found = explain(
+    """Diagnose joints that act on each other."""
+    explanation = explain(
         evidence, lambda steps: progress("fitting effects", steps), thresholds, first_look
     )
-    support = supports(found, evidence, thresholds)
-    named = choose_named(found, support, thresholds)
-    progress("judging on held-out data", 1)
-    validation = validate(evidence, found.fit, named, found.posterior, held_out, thresholds)
-    kept = validation.kept
-    left = _leaves_something(found, kept)
-    notes = [*_notes(evidence.recordings), *_clipping_notes(evidence)]
-    notes += find_stops(evidence.machine, evidence.recordings)
-    notes += find_cut_commands(evidence.machine, evidence.recordings)
-    if validation.rejected:
-        names = " and ".join(effect.name for effect in validation.rejected)
-        notes.append(f"{names} rejected: held-out data became worse with it")
-    if kept and left and validation.largest < thresholds.removes:
-        names = " and ".join(effect.name for effect in kept)
-        share = f"{100 * validation.largest:.0f} %"
-        notes.append(f"{names} not named: it closes at most {share} of any signal's gap")
-        kept = ()
-    plant = with_effects(evidence.plant, found.fit, kept)
-    progress("looking where", 1)
-    disturbed = locate_disturbance(evidence, plant, kept) if left else ()
-    deviations = _deviations(evidence)
-    slight = [
-        each
-        for each in deviations
-        if each.kind in ("setting", "unknown") and each.consequence < thresholds.consequence
-    ]
-    notes += [describe_slight(each) for each in slight]
-    deviations = [each for each in deviations if each not in slight]
-    sampled = find_outstanding(
-        evidence.machine, evidence.recordings, evidence.predict(plant), evidence.plant
-    )
-    attributed = describe_attributed(found, kept, support, evidence, thresholds)
-    effects = [
-        *attributed,
-        *(describe_sensor(each, evidence, thresholds.sure) for each in sampled),
-        *(
-            describe_controller(each, thresholds.sure)
-            for each in deviations
-            if each.kind != "unknown"
-        ),
-    ]
-    odd_controller = any(each.kind == "unknown" for each in deviations)
-    rest = left or odd_controller
-    closed = found.posterior.closes(found.posterior.best)
-    if validation.measurable:
-        closed = validation.held_out.value
-    closes = not kept or closed >= thresholds.explained
-    verdict: Verdict
-    if effects:
-        verdict = "explained" if closes and not rest else "partly explained"
-    else:
-        verdict = "unknown" if rest else "no gap"
-    where = _places(evidence, attributed, plant, kept, disturbed, found.fit)
-    if odd_controller:
-        where.append(
-            Place(
-                "controller",
-                1.0,
-                (0.0, 0.0),
-                "throughout",
-                "its commands are not those of its settings",
-            )
-        )
+    progress("validating on held-out data", 1)
+    judged = _judge(evidence, held_out, explanation, thresholds)
+    named, plant = judged.named, judged.plant
+    progress("locating the residual", 1)
+    disturbances = locate_disturbance(evidence, plant, named) if judged.has_residual else ()
+    readings = _read_signals(evidence, plant, thresholds)
+    attributed = describe_attributed(explanation, named, judged.support, evidence, thresholds)
+    effects = [*attributed, *_describe_readings(readings, evidence, thresholds)]
+    verdict = _choose_verdict(judged, readings, effects, thresholds)
+    where = _places(evidence, attributed, judged, disturbances, readings)
     progress("replaying components", 1)
-    gap = _gap(evidence, plant, validation, sampled)
+    gap = _measure_gap(evidence, plant, judged.validation, readings.sampled)
     progress("choosing the next test", 1)
-    suggestion = _next_test(evidence.machine, found, effects, kept, tests, thresholds)
-    corrected = _correct(evidence.configurations[0], plant, sampled)
-    gone = verdict == "no gap"
+    next_test = _next_test(evidence.machine, explanation, effects, named, tests, thresholds)
+    has_gap = verdict != "no gap"
     answer = Answer(
         verdict=verdict,
         sentence=sentence(verdict, effects, where, gap),
         effects=tuple(effects),
         where=tuple(where),
         gap=gap,
-        ranking=tuple((each.scored.fit.name, each.weight) for each in found.posterior.ranking[:8]),
-        next_test=suggestion,
-        not_observable=list_unobservable(found, attributed),
-        notes=tuple(notes),
+        ranking=tuple(
+            (hypothesis.scored.fit.name, hypothesis.weight)
+            for hypothesis in explanation.posterior.ranking[:RANKED]
+        ),
+        next_test=next_test,
+        not_observable=list_unobservable(explanation, attributed),
+        notes=tuple(_collect_notes(evidence, judged, readings)),
         recordings=tuple(str(recording.path) for recording in evidence.recordings),
         seconds=time.perf_counter() - started,
         machine=evidence.machine.name,
-        steps=steps(evidence, () if gone else found.chain, held_out or evidence),
+        steps=steps(evidence, explanation.chain if has_gap else (), held_out or evidence),
         units={row.name: row.unit for row in evidence.machine.rows},
-        leftovers=tuple(leftovers(evidence, plant, disturbed, thresholds)) if disturbed else (),
-        traces=() if gone else find_traces(found, kept, evidence, thresholds),
-        nearest=find_nearest(found, evidence) if verdict == "unknown" else None,
+        leftovers=tuple(leftovers(evidence, plant, disturbances, thresholds))
+        if disturbances
+        else (),
+        traces=find_traces(explanation, named, evidence, thresholds) if has_gap else (),
+        nearest=find_nearest(explanation, evidence) if verdict == "unknown" else None,
         energy=_energy(evidence),
     )
-    return Diagnosis(
-        answer,
-        evidence.machine,
-        evidence,
-        corrected,
-        _alternatives(found, kept, thresholds.possible),
-        held_out,
+    corrected = _correct(evidence.configurations[0], plant, readings.sampled)
+    otherwise = _other_explanations(explanation, named, thresholds.possible)
+    return Diagnosis(answer, evidence.machine, evidence, corrected, otherwise, held_out)
+
+
+def _judge(
+    evidence: Evidence,
+    held_out: Evidence | None,
+    explanation: Explanation,
+    thresholds: Thresholds,
+) -> _Judged:
+    """Choose the effects that are named, and validate them on held-out data."""
+    support = measure_support(explanation, evidence, thresholds)
+    chosen = choose_named(explanation, support, thresholds)
+    validation = validate(
+        evidence, explanation.fit, chosen, explanation.posterior, held_out, thresholds
+    )
+    named, notes = validation.kept, []
+    has_residual = _has_residual(explanation, named)
+    if validation.rejected:
+        names = " and ".join(effect.name for effect in validation.rejected)
+        notes.append(f"{names} rejected: the prediction of held-out data became worse with it")
+    # Beside a large residual, an effect that removes little of any signal's gap is a coincidence.
+    if named and has_residual and validation.largest < thresholds.removes:
+        names = " and ".join(effect.name for effect in named)
+        share = f"{100 * validation.largest:.0f} %"
+        notes.append(f"{names} not named: the correction closes at most {share} of a signal's gap")
+        named = ()
+    plant = with_effects(evidence.plant, explanation.fit, named)
+    return _Judged(explanation, support, validation, named, has_residual, plant, tuple(notes))
+
+
+def _has_residual(explanation: Explanation, named: Sequence[Effect]) -> bool:
+    """Return whether more than noise and declared error remains after the named effects."""
+    posterior = explanation.posterior
+    if set(named) == set(posterior.best.fit.effects):
+        return posterior.leaves_something
+    identical = [
+        hypothesis.scored
+        for hypothesis in posterior.ranking
+        if set(hypothesis.scored.fit.effects) == set(named)
+    ]
+    # What an effect that was fitted but not named explains is a part of the residual.
+    scored = identical[0] if identical else posterior.empty
+    excess = posterior.loss(scored) - posterior.loss(posterior.best) + posterior.unexplained
+    return excess > posterior.prices.ordinary
+
+
+def _read_signals(evidence: Evidence, plant: Plant, thresholds: Thresholds) -> _Readings:
+    """Compare controller and sensors with their settings."""
+    deviations = _controller_deviations(evidence)
+    negligible = tuple(
+        deviation
+        for deviation in deviations
+        if deviation.kind in ("setting", "unknown")
+        and deviation.consequence < thresholds.consequence
+    )
+    sampled = find_outstanding(
+        evidence.machine, evidence.recordings, evidence.predict(plant), evidence.plant
+    )
+    return _Readings(
+        tuple(sampled),
+        tuple(deviation for deviation in deviations if deviation not in negligible),
+        negligible,
     )
 
 
-def _leaves_something(found: Explanation, kept: Sequence[Effect]) -> bool:
-    """Whether more than noise and declared error is left once the kept effects are corrected."""
-    posterior = found.posterior
-    if set(kept) == set(posterior.best.fit.effects):
-        return posterior.leaves_something
-    known = [each.scored for each in posterior.ranking if set(each.scored.fit.effects) == set(kept)]
-    # What was fitted and is not named leaves what it explained.
-    scored = known[0] if known else posterior.empty
-    left = posterior.loss(scored) - posterior.loss(posterior.best) + posterior.unexplained
-    return left > posterior.prices.ordinary
+def _describe_readings(
+    readings: _Readings, evidence: Evidence, thresholds: Thresholds
+) -> list[Finding]:
+    return [
+        *(describe_sensor(sensor, evidence, thresholds.sure) for sensor in readings.sampled),
+        *(
+            describe_controller(deviation, thresholds.sure)
+            for deviation in readings.deviations
+            if deviation.kind != "unknown"
+        ),
+    ]
 
 
-def _alternatives(
-    found: Explanation, kept: Sequence[Effect], least: float
+def _choose_verdict(
+    judged: _Judged, readings: _Readings, effects: Sequence[Finding], thresholds: Thresholds
+) -> Verdict:
+    has_residual = judged.has_residual or readings.has_unknown_controller
+    if not effects:
+        return "unknown" if has_residual else "no gap"
+    posterior, validation = judged.explanation.posterior, judged.validation
+    # A gap in few frequencies does not raise the rms over all of them above the floor; the closed
+    # share then comes from the spectral lines.
+    closed = (
+        validation.held_out.value if validation.measurable else posterior.closes(posterior.best)
+    )
+    closes_enough = not judged.named or closed >= thresholds.explained
+    return "explained" if closes_enough and not has_residual else "partly explained"
+
+
+def _collect_notes(evidence: Evidence, judged: _Judged, readings: _Readings) -> list[str]:
+    return [
+        *_recording_notes(evidence.recordings),
+        *_clipping_notes(evidence),
+        *find_stops(evidence.machine, evidence.recordings),
+        *find_cut_commands(evidence.machine, evidence.recordings),
+        *judged.notes,
+        *map(describe_negligible, readings.negligible),
+    ]
+
+
+def _other_explanations(
+    explanation: Explanation, named: Sequence[Effect], least: float
 ) -> tuple[tuple[Fit, float], ...]:
-    """Explanations other than the one that is named, of that weight at least, the best first."""
+    """Explanations other than the named one with at least a certain weight, the best first."""
     return tuple(
-        (each.scored.fit, each.weight)
-        for each in found.posterior.ranking
-        if each.scored.fit.effects
-        and set(each.scored.fit.effects) != set(kept)
-        and each.weight >= least
+        (hypothesis.scored.fit, hypothesis.weight)
+        for hypothesis in explanation.posterior.ranking
+        if hypothesis.scored.fit.effects
+        and set(hypothesis.scored.fit.effects) != set(named)
+        and hypothesis.weight >= least
     )
 
 
@@ -336,67 +438,70 @@ def _clipping_notes(evidence: Evidence) -> list[str]:
     ]
 
 
-def _deviations(evidence: Evidence) -> list[Deviation]:
-    """What the controller did other than told, once for all recordings."""
-    found: dict[tuple[str, str], Deviation] = {}
+def _controller_deviations(evidence: Evidence) -> list[Deviation]:
+    """Deviations of the controller from its settings, once for all recordings."""
+    deviations: dict[tuple[str, str], Deviation] = {}
+    control = evidence.machine.control
     for recording, configuration in zip(evidence.recordings, evidence.configurations, strict=True):
-        control = evidence.machine.control
-        told = recording.controller or (control is not None and control.exact is not None)
-        if control is None or not told or OWN in recording.controller:
-            # Nobody said what the controller was told to do, or it was another.
+        is_configured = recording.controller or (control is not None and control.exact is not None)
+        if control is None or not is_configured or OWN in recording.controller:
+            # The recording holds no settings to compare with, or another controller ran.
             continue
         deviation = ControllerReplay(control, recording, configuration.controller).deviation()
         if deviation is not None:
-            found[deviation.kind, deviation.name] = deviation
-    return list(found.values())
+            deviations[deviation.kind, deviation.name] = deviation
+    return list(deviations.values())
 
 
 def _places(
     evidence: Evidence,
     attributed: Sequence[Finding],
-    plant: Plant,
-    kept: tuple[Effect, ...],
-    disturbed: tuple[DisturbanceFit, ...],
-    fit: Fit,
+    judged: _Judged,
+    disturbances: tuple[DisturbanceFit, ...],
+    readings: _Readings,
 ) -> list[Place]:
-    """Where the named effects act, and where the rest lies."""
+    """Locations of the named effects and of the residual, then the controller if it is unknown."""
+    named, fit = judged.named, judged.explanation.fit
     places: dict[str, Place] = {}
-    own = evidence.predict(plant)
+    predicted = evidence.predict(judged.plant)
     for effect, finding in zip(
-        [each for each in fit.effects if each in kept], attributed, strict=True
+        [effect for effect in fit.effects if effect in named], attributed, strict=True
     ):
-        without = with_effects(evidence.plant, fit, [other for other in kept if other != effect])
-        change: list[Array] = [a - b for a, b in zip(own, evidence.predict(without), strict=True)]
+        # An effect acts where removing it alone changes the prediction.
+        rest = [other for other in named if other != effect]
+        without = evidence.predict(with_effects(evidence.plant, fit, rest))
+        change: list[Array] = [a - b for a, b in zip(predicted, without, strict=True)]
         place = locate(evidence, effect.component, finding.share, change)
-        places[effect.name] = replace(place, evidence=f"{effect.kind.title}: {place.evidence}")
-    if disturbed:
-        foremost = disturbed[0]
+        places[effect.name] = replace(place, evidence=f"{effect.kind.title}, {place.evidence}")
+    if disturbances:
+        foremost = disturbances[0]
         share = max(1.0 - sum(finding.share for finding in attributed), 0.0)
-        words = (
-            "what is left goes with " + enumerate_words(foremost.forms)
-            if foremost.forms
-            else "what is left has no plain form"
-        )
-        left = evidence.differences(plant)
-        place = locate(evidence, foremost.component, share, left, words)
+        correlation = describe_correlation(foremost.forms)
+        residual = evidence.differences(judged.plant)
+        place = locate(evidence, foremost.component, share, residual, correlation)
         if all(place.component != foremost.component for place in places.values()):
-            places["left"] = place
-    return sorted(places.values(), key=lambda place: -place.share)
+            places["residual"] = place
+    ordered = sorted(places.values(), key=lambda place: -place.share)
+    if readings.has_unknown_controller:
+        mismatch = "its commands are not those of its settings"
+        ordered.append(Place("controller", 1.0, (0.0, 0.0), "throughout", mismatch))
+    return ordered
 
 
 def _energy(evidence: Evidence) -> dict[str, EnergyError]:
+    """Energy error of each hybrid test, by file name."""
     physics = evidence.machine.physics
-    measured = {
+    errors = {
         recording.path.name: physics.energy_error(recording, configuration)
         for recording, configuration in zip(
             evidence.recordings, evidence.configurations, strict=True
         )
     }
-    return {name: each for name, each in measured.items() if each is not None}
+    return {name: error for name, error in errors.items() if error is not None}
 
 
-def _gap(
-    evidence: Evidence, plant: Plant, outcome: Validation, sampled: Sequence[SensorProperty]
+def _measure_gap(
+    evidence: Evidence, plant: Plant, validation: Validation, sampled: Sequence[SensorProperty]
 ) -> Gap:
     corrected = _correct(evidence.configurations[0], plant, sampled)
     replays, loop = evidence.machine.physics.levels(evidence, plant, corrected)
@@ -404,9 +509,9 @@ def _gap(
         before=gap_level(evidence, evidence.plant),
         after=gap_level(evidence, plant),
         floor=1.0,
-        shrinkage_predicted=outcome.predicted,
-        shrinkage_held_out=outcome.held_out,
-        held_out=outcome.data,
+        shrinkage_predicted=validation.predicted,
+        shrinkage_held_out=validation.held_out,
+        held_out=validation.data,
         replays=replays,
         closed_loop=loop,
     )
@@ -415,29 +520,32 @@ def _gap(
 def _correct(
     nominal: Configuration, plant: Plant, sampled: Sequence[SensorProperty]
 ) -> Configuration:
-    for each in sampled:
-        plant = with_parameters(plant, each.component, {each.parameter: each.value})
+    """Settings with the corrected plant and the sensor properties that were read off signals."""
+    for sensor in sampled:
+        plant = with_parameters(plant, sensor.component, {sensor.parameter: sensor.value})
     return nominal._replace(plant=plant)
 
 
 def _next_test(
     machine: Machine,
-    found: Explanation,
+    explanation: Explanation,
     effects: Sequence[Finding],
-    kept: tuple[Effect, ...],
+    named: tuple[Effect, ...],
     tests: Sequence[Experiment],
     thresholds: Thresholds,
 ) -> NextTest | None:
-    ranking = found.posterior.ranking
+    """Propose a test where a named effect has rivals or is uncertain."""
+    ranking = explanation.posterior.ranking
     likely = [
-        each.scored.fit
-        for each in ranking
-        if each.scored.fit.effects and each.weight >= thresholds.member * ranking[0].weight
+        hypothesis.scored.fit
+        for hypothesis in ranking
+        if hypothesis.scored.fit.effects
+        and hypothesis.weight >= thresholds.member * ranking[0].weight
     ]
-    sure = all(
+    is_certain = all(
         effect.confidence >= thresholds.unsure and len(effect.alternatives) == 1
         for effect in effects
     )
-    if not tests or not kept or sure or len(likely) < 2:
+    if not tests or not named or is_certain or len(likely) < 2:
         return None
-    return propose_test(machine, likely[:4], tests)
+    return propose_test(machine, likely[:SEPARATED], tests)

@@ -1,10 +1,10 @@
-"""The pictures of a report, drawn: lines that a reader can zoom, without a network.
+"""Figures of a report: lines that a reader can zoom without a network.
 
 Bokeh draws them. Its wheel ships its JavaScript, of which the core alone is bundled into the file
-(1.3 MB; Plotly's is 4.8 MB), and it draws on a canvas, which stays quick with ten thousand points.
+(1.3 MB; Plotly's is 4.8 MB). It draws on a canvas, which stays quick with ten thousand points.
 """
 
-# Bokeh gives its models' properties the type of the property, not of what is assigned to it.
+# Bokeh declares a property with the property's type, not with that of the assigned value.
 # pyright: reportArgumentType=false
 from __future__ import annotations
 
@@ -22,35 +22,46 @@ from bokeh.resources import Resources
 from markupsafe import Markup
 
 from rigtwin.diagnosis.overlay import Overlay
-from rigtwin.diagnosis.pictures import Curve, Picture
-from rigtwin.diagnosis.units import find_unit, say, spell
+from rigtwin.diagnosis.pictures import Picture, PictureCurve
+from rigtwin.diagnosis.units import find_unit, spell
 from rigtwin.numerics.arrays import Array
 
 MEASURED, BEFORE, AFTER, SAMPLES = "#1e293b", "#c2410c", "#0f766e", "#94a3b8"
 COLOURS = {"measured": MEASURED, "before": BEFORE, "after": AFTER, "samples": SAMPLES}
 LABELS = {
     "measured": "measured",
-    "before": "without it",
-    "after": "with it",
+    "before": "without the effect",
+    "after": "with the effect",
     "samples": "single samples",
 }
 WIDTHS = {"measured": 6.0, "before": 1.8, "after": 1.6}
 HEIGHT = 340
-"""px."""
-LINES = 240_000
+"""Height of a figure, px."""
+ALL_POINTS = 240_000
 """Points of all overlaid lines of a report together."""
 MOST, LEAST = 4000, 600
-"""Points of one of them."""
-NAMED = re.compile(r'"(p\d{4,}|[0-9a-f]{8}(?:-[0-9a-f]{4}){3}-[0-9a-f]{12})"')
-"""What Bokeh calls its models, and their places on the page, by chance."""
+"""Largest and smallest number of points of one overlaid line."""
+IDENTIFIER = re.compile(r'"(p\d{4,}|[0-9a-f]{8}(?:-[0-9a-f]{4}){3}-[0-9a-f]{12})"')
+"""Identifiers that Bokeh draws at random for its models and their places on the page."""
 MARGIN = 0.06
-"""Of an axis beyond what is looked at."""
+"""Margin of an axis beyond the values in view, as a share of their range."""
+CROWD = 100
+"""Points from which a cloud is drawn with small, translucent dots."""
 
 
 @dataclass(frozen=True)
 class Drawn:
-    """One figure of the page. markup: where it stands; label: what it is, for a screen reader;
-    caption: what to see in it."""
+    """One figure of the page.
+
+    Attributes
+    ----------
+    markup
+        Element that the script fills.
+    label
+        Description for a screen reader.
+    caption
+        Sentences that tell what to see in the figure.
+    """
 
     markup: Markup
     label: str
@@ -59,7 +70,19 @@ class Drawn:
 
 @dataclass(frozen=True)
 class Drawings:
-    """All figures of a page and what runs them. library: Bokeh itself; script: their data."""
+    """All figures of a page.
+
+    Attributes
+    ----------
+    evidence
+        Pictures of the effects.
+    overlays
+        Sensors over time.
+    library
+        JavaScript of Bokeh.
+    script
+        Data of the figures.
+    """
 
     evidence: tuple[Drawn, ...]
     overlays: tuple[Drawn, ...]
@@ -68,20 +91,22 @@ class Drawings:
 
 
 def thin(time: Array, values: Array, points: int) -> tuple[Array, Array]:
-    """A line with so few points that its least and greatest value stay wherever one pixel holds
-    several.
+    """Thin a line so that its extremes remain.
+
+    Every block of ticks keeps its smallest and its largest value. A pixel that holds a block then
+    shows the same stroke as with all ticks, so peaks stay visible.
 
     Parameters
     ----------
     time, values
-        Shape (ticks,).
+        Coordinates, shape (ticks,).
     points
-        At most so many.
+        Largest number of points of the result, plus one for an incomplete last block.
 
     Returns
     -------
     tuple of arrays
-        Time and values of at most `points` ticks, in their order.
+        Time and values of the remaining ticks, in their order.
     """
     if len(values) <= points:
         return time, values
@@ -89,13 +114,17 @@ def thin(time: Array, values: Array, points: int) -> tuple[Array, Array]:
     whole = len(values) // block * block
     folded = values[:whole].reshape(-1, block)
     start = np.arange(len(folded)) * block
-    kept = np.unique(np.concatenate([start + folded.argmin(axis=1), start + folded.argmax(axis=1)]))
+    remaining = np.unique(
+        np.concatenate([start + folded.argmin(axis=1), start + folded.argmax(axis=1)])
+    )
     if whole < len(values):
-        kept = np.append(kept, len(values) - 1)
-    return time[kept], values[kept]
+        remaining = np.append(remaining, len(values) - 1)
+    return time[remaining], values[remaining]
 
 
-def _canvas(x: str, y: str, logarithmic: tuple[bool, bool], start: Range1d | None = None) -> figure:
+def _make_figure(
+    x: str, y: str, logarithmic: tuple[bool, bool], start: Range1d | None = None
+) -> figure:
     ranges = {} if start is None else {"x_range": start}
     drawn = figure(
         height=HEIGHT,
@@ -125,11 +154,12 @@ def _canvas(x: str, y: str, logarithmic: tuple[bool, bool], start: Range1d | Non
     return drawn
 
 
-def _draw_curve(drawn: figure, curve: Curve, x: Array, y: Array, label: str) -> None:
+def _draw_curve(drawn: figure, curve: PictureCurve, x: Array, y: Array, label: str) -> None:
+    # Single precision halves the file; no screen has more digits.
     source = ColumnDataSource({"x": x.astype(np.float32), "y": y.astype(np.float32)})
     colour = COLOURS[curve.role]
     if curve.points:
-        crowd = len(x) > 100
+        crowd = len(x) > CROWD
         drawn.scatter(
             "x",
             "y",
@@ -146,7 +176,7 @@ def _draw_curve(drawn: figure, curve: Curve, x: Array, y: Array, label: str) -> 
         "y",
         source=source,
         color=colour,
-        # The measured line is broad and pale, so that it shows under one that lies on it.
+        # The measured line is broad and pale, so that it stays visible under a prediction.
         line_width=WIDTHS[curve.role],
         line_alpha=0.4 if curve.role == "measured" else 1.0,
         line_dash="dashed" if curve.role == "before" else "solid",
@@ -166,12 +196,25 @@ def _place_legend(drawn: figure) -> None:
 
 
 def draw_picture(picture: Picture) -> figure:
-    """An effect in the data."""
+    """Draw an effect in the data.
+
+    Parameters
+    ----------
+    picture
+        Numbers of the picture.
+
+    Returns
+    -------
+    figure
+        Bokeh figure with axes in engineering units.
+    """
     x_all = np.concatenate([curve.x for curve in picture.curves])
     y_all = np.concatenate([curve.y for curve in picture.curves])
     x_factor, x_unit = find_unit(picture.x_unit, float(np.max(np.abs(x_all), initial=0.0)))
     y_factor, y_unit = find_unit(picture.y_unit, float(np.max(np.abs(y_all), initial=0.0)))
-    drawn = _canvas(_label(picture.x, x_unit), _label(picture.y, y_unit), picture.logarithmic, None)
+    drawn = _make_figure(
+        _label(picture.x, x_unit), _label(picture.y, y_unit), picture.logarithmic, None
+    )
     for curve in picture.curves:
         _draw_curve(drawn, curve, x_factor * curve.x, y_factor * curve.y, LABELS[curve.role])
     _place_legend(drawn)
@@ -183,7 +226,22 @@ def _label(name: str, unit: str) -> str:
 
 
 def draw_overlay(overlay: Overlay, points: int, corrected: bool) -> figure:
-    """A sensor as measured and as predicted, its worst second in view."""
+    """Draw a sensor as measured and as predicted.
+
+    Parameters
+    ----------
+    overlay
+        Signals of the sensor.
+    points
+        Largest number of points of a line.
+    corrected
+        Whether the corrected prediction is drawn too.
+
+    Returns
+    -------
+    figure
+        Bokeh figure with the second of the largest error in view.
+    """
     signals = {"measured": overlay.measured, "before": overlay.nominal}
     if corrected:
         signals["after"] = overlay.corrected
@@ -192,27 +250,27 @@ def draw_overlay(overlay: Overlay, points: int, corrected: bool) -> figure:
     first, last = float(overlay.time[0]), float(overlay.time[-1])
     largest = max(float(np.max(np.abs(values))) for values in signals.values())
     factor, unit = find_unit(overlay.unit, largest)
-    drawn = _canvas(
+    drawn = _make_figure(
         "time, s",
         _label(overlay.sensor.replace("_", " "), unit),
         (False, False),
         Range1d(start, end, bounds=(first, last)),
     )
-    seen = (overlay.time >= start) & (overlay.time <= end)
-    shown = np.concatenate([factor * values[seen] for values in signals.values()])
+    in_view = (overlay.time >= start) & (overlay.time <= end)
+    shown = np.concatenate([factor * values[in_view] for values in signals.values()])
     low, high = float(shown.min()), float(shown.max())
     margin = MARGIN * (high - low) or 1.0
     drawn.y_range = Range1d(low - margin, high + margin)
     for role, values in signals.items():
-        time, thinned = _thin_beside(overlay.time, values, seen, points)
-        _draw_curve(drawn, Curve(role, time, thinned), time, factor * thinned, labels[role])
+        time, thinned = _thin_outside(overlay.time, values, in_view, points)
+        _draw_curve(drawn, PictureCurve(role, time, thinned), time, factor * thinned, labels[role])
     _place_legend(drawn)
     return drawn
 
 
-def _thin_beside(time: Array, values: Array, seen: Array, points: int) -> tuple[Array, Array]:
-    """The stretch in view with half of the points, the rest with the others."""
-    first, last = int(np.argmax(seen)), len(seen) - int(np.argmax(seen[::-1]))
+def _thin_outside(time: Array, values: Array, in_view: Array, points: int) -> tuple[Array, Array]:
+    """Thin a line, with half of the points for the stretch in view."""
+    first, last = int(np.argmax(in_view)), len(in_view) - int(np.argmax(in_view[::-1]))
     parts = [
         thin(time[part], values[part], count)
         for part, count in (
@@ -226,52 +284,58 @@ def _thin_beside(time: Array, values: Array, seen: Array, points: int) -> tuple[
 
 def _caption(overlay: Overlay, corrected: bool) -> str:
     start, end = overlay.worst
+    # One unit for both errors, so that they can be compared at a glance.
+    factor, unit = find_unit(overlay.unit, max(overlay.before, overlay.after))
     name = overlay.sensor.replace("_", " ")
     where = f"{'held-out ' if overlay.held_out else ''}{overlay.recording}"
     text = (
         f"The {name} of {where}, {start:.2f} to {end:.2f} s, where the "
-        f"{'corrected' if corrected else 'nominal'} prediction is worst. "
-        f"The nominal one is off by {say(overlay.before, overlay.unit)} rms "
-        f"({spell(overlay.before_percent, 2)} % of the signal) over the whole recording"
+        f"{'corrected' if corrected else 'nominal'} prediction has its largest error. "
+        "Rms error over the whole recording: "
+        f"{spell(factor * overlay.before, 3)} {unit} ({spell(overlay.before_percent, 2)} % of the "
+        "signal) nominal"
     )
     if corrected:
         text += (
-            f", the corrected one by {say(overlay.after, overlay.unit)} "
-            f"({spell(overlay.after_percent, 2)} %)"
+            f", {spell(factor * overlay.after, 3)} {unit} "
+            f"({spell(overlay.after_percent, 2)} %) corrected"
         )
     return f"{text}."
 
 
-def _name_steadily(script: str, places: Sequence[str]) -> list[str]:
-    """The script and its places with names that are the same whenever the same is drawn, and
-    others for another page, since a notebook may show several."""
+def _name_reproducibly(script: str, places: Sequence[str]) -> list[str]:
+    """Replace Bokeh's random identifiers by ones that follow from the content.
+
+    The same diagnosis then gives the same file. The identifiers hold a digest of the page, because
+    a notebook may show several pages and they must not clash.
+    """
     texts = [script, *places]
-    names = list(dict.fromkeys(name for text in texts for name in NAMED.findall(text)))
+    names = list(dict.fromkeys(name for text in texts for name in IDENTIFIER.findall(text)))
     numbers = {name: number for number, name in enumerate(names)}
-    bare = [NAMED.sub(lambda found: f'"{numbers[found[1]]}"', text) for text in texts]
+    bare = [IDENTIFIER.sub(lambda match: f'"{numbers[match[1]]}"', text) for text in texts]
     page = hashlib.sha256("".join(bare).encode()).hexdigest()[:8]
-    return [NAMED.sub(lambda found: f'"{page}-{numbers[found[1]]}"', text) for text in texts]
+    return [IDENTIFIER.sub(lambda match: f'"{page}-{numbers[match[1]]}"', text) for text in texts]
 
 
 def draw(pictures: Sequence[Picture], overlays: Sequence[Overlay], corrected: bool) -> Drawings:
-    """Draws all figures of a report.
+    """Draw all figures of a report.
 
     Parameters
     ----------
     pictures
-        One for each finding.
+        One picture for each finding.
     overlays
-        The sensors.
+        Overlays of all sensors and recordings.
     corrected
         Whether there is a corrected prediction beside the nominal one.
 
     Returns
     -------
     Drawings
-        Ready for the page.
+        Markup and scripts for the page. Empty without pictures and overlays.
     """
     lines = (3 if corrected else 2) * max(len(overlays), 1)
-    points = min(max(LINES // lines, LEAST), MOST)
+    points = min(max(ALL_POINTS // lines, LEAST), MOST)
     captions = [picture.caption for picture in pictures]
     captions += [_caption(overlay, corrected) for overlay in overlays]
     labels = [f"{p.effect}: {p.y} against {p.x}" for p in pictures]
@@ -285,7 +349,7 @@ def draw(pictures: Sequence[Picture], overlays: Sequence[Overlay], corrected: bo
     ]
     if not models:
         return Drawings((), (), Markup(), Markup())
-    script, *places = _name_steadily(*components(tuple(models)))
+    script, *places = _name_reproducibly(*components(tuple(models)))
     drawn = [
         Drawn(Markup(place), label, caption)
         for place, label, caption in zip(places, labels, captions, strict=True)

@@ -1,4 +1,8 @@
-"""What a diagnosis says, as frozen data and as the JSON that other programs read."""
+"""The answer of a diagnosis, as frozen data and as the JSON document that other programs read.
+
+Field names are JSON keys, except where `Answer.document` writes the key explicitly. The schema is
+`answer.schema.json`.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +19,22 @@ VERDICTS: tuple[str, ...] = get_args(Verdict)
 
 @dataclass(frozen=True)
 class Estimate:
-    """A parameter's value with its 95 % interval, and what it is nominally, in its unit."""
+    """Estimated value of a parameter with its interval.
+
+    The interval spans `Thresholds.wider` standard errors to either side. How often such an interval
+    holds the true value was measured and is published in docs/confidence.md.
+
+    Attributes
+    ----------
+    value
+        Best estimate, in `unit`.
+    low, high
+        Ends of the interval, in `unit`.
+    nominal
+        Value that the uncorrected twin uses, in `unit`.
+    unit
+        SI unit of all four numbers; "1" for a ratio.
+    """
 
     value: float
     low: float
@@ -26,7 +45,7 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Name:
-    """A kind of effect at a component."""
+    """A kind of effect at a component, written `kind@component`."""
 
     component: str
     kind: str
@@ -37,16 +56,16 @@ class Name:
 
 @dataclass(frozen=True)
 class Rival:
-    """An effect that the data cannot tell from a named one.
+    """An effect that the data cannot distinguish from a named one.
 
-    Parameters
+    Attributes
     ----------
     name
-        Kind and component.
+        Kind and component of the rival.
     parameters
-        Values that it has in the place of the named effect.
+        Values that the rival takes when it replaces the named effect.
     probability
-        Weight of all hypotheses with it.
+        Weight of all hypotheses that contain the rival.
     """
 
     name: Name
@@ -56,27 +75,28 @@ class Rival:
 
 @dataclass(frozen=True)
 class Finding:
-    """An effect that is named.
+    """A named effect.
 
-    Parameters
+    Attributes
     ----------
     name
-        Kind and component.
+        Kind and component of the effect.
     parameters
-        Values with their intervals.
+        Parameter name → estimated value with its interval.
     confidence
-        Probability that it is this effect.
+        Calibrated probability that the effect is present.
     alternatives
-        Effects that the data cannot tell from it, itself first (`class` in JSON).
+        Effects that the data cannot distinguish, the named one first (`class` in JSON).
     share
-        Share of the gap that would come back without it. Of an effect that is read off a sensor or
-        the controller alone, share of that one's own gap.
+        Share of the gap's power that would return if the effect were removed from the correction.
+        For an effect that is read off one sensor or off the controller alone, it is the share of
+        that signal's own gap.
     title
-        Its kind in a sentence.
+        Kind of the effect in words, for use in a sentence.
     support
-        What the confidence rests on; None where the effect is read off a signal.
+        Evidence behind the confidence. None where the effect is read off a signal directly.
     rivals
-        The alternatives with the values that they would have.
+        The alternatives without the named effect, with the values that they would have.
     """
 
     name: Name
@@ -91,8 +111,21 @@ class Finding:
 
 @dataclass(frozen=True)
 class Place:
-    """Where a gap lies. band_hz: where the middle 80 % of its power lies; region: of operation;
-    evidence: in words."""
+    """Location of a difference between the twin and the machine.
+
+    Attributes
+    ----------
+    component
+        Component, or sensor, at which the difference arises.
+    share
+        Share of the gap's power.
+    band_hz
+        Frequencies, Hz, between which the middle 80 % of the power lies.
+    region
+        Operating region that holds most of the power, such as "velocity reversal".
+    evidence
+        Observation that supports the location, as a clause of a sentence.
+    """
 
     component: str
     share: float
@@ -103,7 +136,7 @@ class Place:
 
 @dataclass(frozen=True)
 class Interval:
-    """A value with its 95 % interval."""
+    """A value and the ends of its interval."""
 
     value: float
     low: float
@@ -112,7 +145,7 @@ class Interval:
 
 @dataclass(frozen=True)
 class Level:
-    """A gap before and after the correction, and what noise alone leaves."""
+    """Size of a gap before and after the correction, and the floor that noise alone leaves."""
 
     before: float
     after: float
@@ -121,11 +154,27 @@ class Level:
 
 @dataclass(frozen=True)
 class Gap:
-    """before, after, floor: rms of all sensors less what the twin predicts from the commands, in
-    units of their white noise. shrinkage: share of the gap above the floor that the correction
-    closes, predicted from the data of the fit, and achieved on data held out of it. replays: each
-    component's own; closed_loop: dB between the spectra of the recording and of the twin's own run,
-    which no phase of a limit cycle changes."""
+    """Difference between twin and machine before and after the correction.
+
+    Attributes
+    ----------
+    before, after
+        Rms over all sensors of measured minus predicted, in units of the sensors' white noise.
+    floor
+        The same rms for a perfect twin.
+    shrinkage_predicted
+        Share of the gap above the floor that the correction closes on the data of the fit.
+    shrinkage_held_out
+        Share that the correction closes on data held out of the fit, with a bootstrap interval.
+    held_out
+        Description of the held-out data.
+    replays
+        Component → gap of the component driven alone by recorded signals.
+    closed_loop
+        Difference in dB between the spectra of the recording and of the twin's own closed-loop run.
+        The spectra hold no phase, so the phase of a limit cycle does not matter. None where the
+        machine has no closed loop to run.
+    """
 
     before: float
     after: float
@@ -139,8 +188,19 @@ class Gap:
 
 @dataclass(frozen=True)
 class NextTest:
-    """The test that would separate the explanations that remain best. command: ready to run;
-    separates: χ² between them."""
+    """Test that would best separate the remaining explanations.
+
+    Attributes
+    ----------
+    experiment
+        Name of the experiment.
+    command
+        Command line that runs it.
+    separates
+        Smallest χ² between the prediction of the likeliest explanation and that of another.
+    between
+        Names of the explanations that the test separates.
+    """
 
     experiment: str
     command: str
@@ -150,7 +210,7 @@ class NextTest:
 
 @dataclass(frozen=True)
 class Unobservable:
-    """An effect that these data could not show, and why."""
+    """Effect that the recordings could not show at any size, and the reason (`why`)."""
 
     component: str
     kind: str
@@ -159,38 +219,94 @@ class Unobservable:
 
 @dataclass(frozen=True)
 class Nearest:
-    """The explanation that comes nearest where none is good enough to be named.
+    """Best explanation of a gap for which no effect is good enough to be named.
 
-    Parameters
+    Attributes
     ----------
     names
-        Its effects.
-    left, without
-        Residual with and without it, in units of the signals' standard deviation.
+        Effects of the explanation.
+    residual
+        Rms residual with these effects, as a share of the signals' standard deviation (`left` in
+        JSON).
+    without
+        The same without them.
     """
 
     names: tuple[Name, ...]
-    left: float
+    residual: float
     without: float
 
 
 @dataclass(frozen=True)
 class Step:
-    """One effect more. added: its name, or of all that changed; values: of its parameters then;
-    left: rms of what each signal has left, in its unit, on the data that it is judged on."""
+    """One stage of the search: the model with one more effect, and its residual.
+
+    Attributes
+    ----------
+    added
+        Effects that were added and removed at this stage, in words.
+    values
+        Parameter name → value when its effect was added. The final values may differ.
+    residual
+        Signal → rms of measured minus predicted, in the signal's SI unit, on the data that judge
+        the correction (`left` in JSON).
+    """
 
     added: str
     values: dict[str, Estimate]
-    left: dict[str, float]
+    residual: dict[str, float]
+
+    def document(self) -> dict[str, Any]:
+        """Return the stage as JSON has it."""
+        values = {name: asdict(estimate) for name, estimate in self.values.items()}
+        return {"added": self.added, "values": values, "left": dict(self.residual)}
 
 
 @dataclass(frozen=True, kw_only=True)
 class Answer:
-    """The whole answer. ranking: explanations with their probability, the likeliest first; notes:
-    what people should know; steps: what each effect changed as they were found one after another,
-    the nominal machine first; units: of their signals; leftovers: where what is still left lies;
-    traces: effects that close a little more of the gap, too small to be claimed; nearest: of an
-    unknown, what comes nearest to it; energy: recording of a hybrid test → what its loop put in."""
+    """Complete answer of a diagnosis.
+
+    Attributes
+    ----------
+    verdict
+        One of `VERDICTS`.
+    sentence
+        The answer on one line.
+    effects
+        Effects that are named.
+    where
+        Locations of the gap, the largest share first.
+    gap
+        Gap before and after the correction. None where the data cannot be diagnosed.
+    ranking
+        Explanations with their probability, the likeliest first.
+    next_test
+        Test that would separate the remaining explanations. None where none is needed or known.
+    not_observable
+        Effects that these recordings could not show.
+    faults
+        Defects of the recordings that forbid a diagnosis.
+    notes
+        Remarks on the data and on rejected effects, one sentence each.
+    recordings
+        Paths of the recordings.
+    seconds
+        Duration of the diagnosis, s.
+    machine
+        Name of the machine.
+    steps
+        Residuals as effects were added one after another, the nominal machine first.
+    units
+        Signal → SI unit of its residual in `steps`.
+    leftovers
+        Locations of the residual that the corrected twin does not model.
+    traces
+        Effects that would close a little more of the gap, but too little to be named.
+    nearest
+        Best explanation of an unknown gap. None for every other verdict.
+    energy
+        Recording of a hybrid test → energy that its loop added.
+    """
 
     verdict: Verdict
     sentence: str
@@ -213,45 +329,55 @@ class Answer:
     energy: dict[str, EnergyError] = field(default_factory=dict)
 
     def document(self) -> dict[str, Any]:
-        """The JSON document."""
-        gap = None
-        if self.gap is not None:
-            gap = asdict(self.gap)
+        """Return the JSON document, which keeps to `answer.schema.json`."""
         return {
             "verdict": self.verdict,
             "machine": self.machine,
             "sentence": self.sentence,
-            "effects": [_finding(effect) for effect in self.effects],
-            "traces": [_finding(effect) for effect in self.traces],
+            "effects": [_finding_document(effect) for effect in self.effects],
+            "traces": [_finding_document(effect) for effect in self.traces],
             "where": [asdict(place) for place in self.where],
-            "gap": gap,
+            "gap": None if self.gap is None else asdict(self.gap),
             "ranking": [
                 {"explanation": name, "probability": probability}
                 for name, probability in self.ranking
             ],
             "next_test": None if self.next_test is None else asdict(self.next_test),
-            "not_observable": [asdict(each) for each in self.not_observable],
+            "not_observable": [asdict(effect) for effect in self.not_observable],
             "faults": list(self.faults),
             "notes": list(self.notes),
-            "steps": [asdict(step) for step in self.steps],
+            "steps": [step.document() for step in self.steps],
             "units": dict(self.units),
             "leftovers": [asdict(place) for place in self.leftovers],
-            "nearest": None if self.nearest is None else asdict(self.nearest),
+            "nearest": None if self.nearest is None else _nearest_document(self.nearest),
+            # JSON has no number for an infinite share.
             "energy": {
-                name: {**asdict(each), "share": each.share if math.isfinite(each.share) else None}
-                for name, each in self.energy.items()
+                name: {
+                    **asdict(error),
+                    "share": error.share if math.isfinite(error.share) else None,
+                }
+                for name, error in self.energy.items()
             },
             "recordings": list(self.recordings),
             "seconds": self.seconds,
         }
 
 
-def _finding(effect: Finding) -> dict[str, Any]:
+def _nearest_document(nearest: Nearest) -> dict[str, Any]:
+    return {
+        "names": [asdict(name) for name in nearest.names],
+        "left": nearest.residual,
+        "without": nearest.without,
+    }
+
+
+def _finding_document(effect: Finding) -> dict[str, Any]:
     return {
         "component": effect.name.component,
         "kind": effect.name.kind,
         "parameters": {name: asdict(value) for name, value in effect.parameters.items()},
         "confidence": effect.confidence,
+        # `class` is a keyword of Python, so the field has another name.
         "class": [asdict(name) for name in effect.alternatives],
         "share": effect.share,
         "support": None if effect.support is None else asdict(effect.support),

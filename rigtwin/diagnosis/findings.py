@@ -1,5 +1,4 @@
-"""What is claimed: effects with their magnitudes, how sure that is, and what these data cannot tell
-from them."""
+"""Findings of a diagnosis: effects with their values, intervals, confidence and rivals."""
 
 from __future__ import annotations
 
@@ -18,28 +17,34 @@ from rigtwin.diagnosis.fit import Fit
 from rigtwin.diagnosis.posterior import Posterior
 from rigtwin.diagnosis.sampling import SensorProperty
 from rigtwin.diagnosis.support import Support
-from rigtwin.diagnosis.text import tell_apart
+from rigtwin.diagnosis.text import format_distinct
 from rigtwin.diagnosis.thresholds import STANDARD, Thresholds
 
 WIDEST = 0.9
-"""Share of the distance to the nominal value that an interval widened by the rest may span."""
-SHOWN = 1e-3
+"""Upper bound on the half interval that a residual widens, as a share of the distance to nominal.
+
+Widening alone therefore never makes an interval hold the nominal value."""
+TRACE_WEIGHT = 1e-3
 """Weight from which a hypothesis with one more effect makes that effect a trace."""
+READING_ERROR = 0.05
+"""Half interval of a sensor property that is read off the signal, as a share of its value."""
+SETTING_ERROR = 1e-3
+"""Half interval of a controller setting that reproduces the commands, as a share of its value."""
 
 
-def supports(
-    found: Explanation, evidence: Evidence, thresholds: Thresholds
+def measure_support(
+    explanation: Explanation, evidence: Evidence, thresholds: Thresholds
 ) -> dict[Effect, Support]:
-    """What speaks for each effect of the best hypothesis.
+    """Measure the support of each effect of the best hypothesis.
 
     Parameters
     ----------
-    found
-        Everything that was tried.
+    explanation
+        Result of the search.
     evidence
-        The recordings.
+        Recordings that were fitted.
     thresholds
-        Numbers that it goes by.
+        Thresholds of the diagnosis.
 
     Returns
     -------
@@ -47,39 +52,59 @@ def supports(
         Effect → its support.
     """
     return {
-        effect: support_of(effect, found.posterior, evidence, thresholds)
-        for effect in found.fit.effects
+        effect: support_of(effect, explanation.posterior, evidence, thresholds)
+        for effect in explanation.fit.effects
     }
 
 
 def choose_named(
-    found: Explanation, support: dict[Effect, Support], thresholds: Thresholds
+    explanation: Explanation, support: dict[Effect, Support], thresholds: Thresholds
 ) -> tuple[Effect, ...]:
     """Choose the effects of the best hypothesis that are named.
 
-    An effect is named where it, or one that the data cannot tell from it, is more likely there than
-    not. All of its rivals take its place together, unless they are so many that the finding says
-    little of what is there.
+    An effect is named if the probability that it or one of its rivals is present is at least
+    `Thresholds.nameable`. The rivals count together, because the finding lists them all. An effect
+    with too many rivals is not named: the finding would say little.
+
+    Parameters
+    ----------
+    explanation
+        Result of the search.
+    support
+        Support of each effect of the best hypothesis.
+    thresholds
+        Thresholds of the diagnosis.
+
+    Returns
+    -------
+    tuple of Effect
+        Named effects, in the order of the fit.
     """
-    posterior, named = found.posterior, []
+    posterior, named = explanation.posterior, []
     for effect, values, widths in zip(
-        found.fit.effects, found.fit.values, _widths(found, support, thresholds), strict=True
+        explanation.fit.effects,
+        explanation.fit.values,
+        _standard_errors(explanation, support, thresholds),
+        strict=True,
     ):
         nominal = effect.nominal(posterior.nominal)[effect.kind.parameters[0]]
         if abs(values[0] - nominal) <= thresholds.wider * widths[0]:
-            # An interval that holds the nominal value is no finding.
+            # The interval holds the nominal value, so the data do not ask for a change.
             continue
-        shares = [posterior.inclusion(each) for each in (effect, *posterior.rivals(effect))]
-        chance = min(sum(shares), 1.0) * (1.0 - support[effect].mimic)
+        shares = [
+            posterior.inclusion(candidate) for candidate in (effect, *posterior.rivals(effect))
+        ]
+        probability = min(sum(shares), 1.0) * (1.0 - support[effect].mimic)
+        # Effective number of rivals (inverse participation ratio): n for n equal shares.
         members = sum(shares) ** 2 / sum(share**2 for share in shares)
-        if chance >= thresholds.nameable and members <= thresholds.members:
+        if probability >= thresholds.nameable and members <= thresholds.members:
             named.append(effect)
     return tuple(named)
 
 
 def describe_attributed(
-    found: Explanation,
-    kept: Sequence[Effect],
+    explanation: Explanation,
+    named: Sequence[Effect],
     support: dict[Effect, Support],
     evidence: Evidence,
     thresholds: Thresholds,
@@ -88,28 +113,28 @@ def describe_attributed(
 
     Parameters
     ----------
-    found
-        Everything that was tried.
-    kept
+    explanation
+        Result of the search.
+    named
         Effects that are named.
     support
-        What speaks for each of them.
+        Support of each effect of the best hypothesis.
     evidence
-        The recordings.
+        Recordings that were fitted.
     thresholds
-        Numbers that it goes by.
+        Thresholds of the diagnosis.
 
     Returns
     -------
     list of Finding
-        In the order of the fit.
+        Findings in the order of the fit.
     """
-    posterior, fit = found.posterior, found.fit
-    shares = _shares(fit, kept, evidence, posterior)
+    posterior, fit = explanation.posterior, explanation.fit
+    shares = _shares(fit, named, evidence, posterior)
     findings = []
-    all_widths = _widths(found, support, thresholds)
+    all_widths = _standard_errors(explanation, support, thresholds)
     for effect, values, widths in zip(fit.effects, fit.values, all_widths, strict=True):
-        if effect not in kept:
+        if effect not in named:
             continue
         rivals = posterior.rivals(effect)
         findings.append(
@@ -117,146 +142,167 @@ def describe_attributed(
                 name=_name(effect),
                 parameters=estimates(effect, values, widths, evidence, thresholds.wider),
                 confidence=min(support[effect].confidence, thresholds.sure),
-                alternatives=tuple(_name(each) for each in (effect, *rivals)),
+                alternatives=tuple(_name(candidate) for candidate in (effect, *rivals)),
                 share=shares[effect],
                 title=effect.kind.title,
                 support=support[effect],
-                rivals=tuple(_describe_rival(each, effect, found, evidence) for each in rivals),
+                rivals=tuple(
+                    _describe_rival(rival, effect, explanation, evidence) for rival in rivals
+                ),
             )
         )
     return findings
 
 
-def _describe_rival(rival: Effect, effect: Effect, found: Explanation, evidence: Evidence) -> Rival:
-    """A rival with the values that it has in the effect's place."""
-    rest = set(found.fit.effects) - {effect}
-    for each in found.posterior.ranking:
-        fit = each.scored.fit
+def _describe_rival(
+    rival: Effect, effect: Effect, explanation: Explanation, evidence: Evidence
+) -> Rival:
+    """Describe a rival with its values in the best hypothesis that has it instead of an effect."""
+    rest = set(explanation.fit.effects) - {effect}
+    for hypothesis in explanation.posterior.ranking:
+        fit = hypothesis.scored.fit
         if rival in fit.effects and rest <= set(fit.effects):
             number = fit.effects.index(rival)
-            widths = each.scored.widths[number]
+            widths = hypothesis.scored.widths[number]
             values = estimates(rival, fit.values[number], widths, evidence)
-            return Rival(_name(rival), values, found.posterior.inclusion(rival))
-    return Rival(_name(rival), {}, found.posterior.inclusion(rival))
+            return Rival(_name(rival), values, explanation.posterior.inclusion(rival))
+    return Rival(_name(rival), {}, explanation.posterior.inclusion(rival))
 
 
-def _widths(
-    found: Explanation, support: dict[Effect, Support], thresholds: Thresholds
+def _standard_errors(
+    explanation: Explanation, support: dict[Effect, Support], thresholds: Thresholds
 ) -> list[tuple[float, ...]]:
-    """Standard errors of all values.
+    """Standard errors of all values of the best hypothesis, one tuple per effect.
 
-    Each combines the larger one of cross-validation and final fit, the spread over hypotheses, and
-    the shift that the rest may cause. A rest whose amplitude is 1/d of an effect's own shifts its
-    magnitude by 1/d times the correlation of both, of which only the usual size is known. That
-    shift does not make an effect doubtful: `Support.mimic` says how likely the rest has been taken
-    for it.
+    The standard error of a value is
+
+        sqrt(max(s_cv, s_fit)^2 + s_hypotheses^2 + b^2),    b = aligned / d · |value - nominal|,
+
+    with the standard errors of cross-validation and of the final fit, the spread of the value over
+    all hypotheses, and the bias b that the unexplained residual may cause. A residual whose
+    amplitude is 1/d of the effect's response shifts the magnitude by 1/d times the correlation of
+    both, of which only the usual size (`Thresholds.aligned`) is known. The bias widens the interval
+    but does not lower the confidence: `Support.mimic` covers an effect that merely resembles the
+    residual.
     """
-    posterior, widths = found.posterior, []
+    posterior, errors = explanation.posterior, []
     for effect, values, scored, fitted in zip(
-        found.fit.effects,
-        found.fit.values,
+        explanation.fit.effects,
+        explanation.fit.values,
         posterior.best.widths,
-        found.fit.widths,
+        explanation.fit.widths,
         strict=True,
     ):
         nominal = effect.nominal(posterior.nominal)[effect.kind.parameters[0]]
         parts = zip(scored, fitted, posterior.spread(effect), strict=True)
-        own = [math.hypot(max(one, other), spread) for one, other, spread in parts]
-        off = abs(values[0] - nominal)
-        shift = thresholds.aligned / support[effect].dominance * off
-        most = max(own[0], WIDEST * off / thresholds.wider)
-        widths.append((min(math.hypot(own[0], shift), most), *own[1:]))
-    return widths
+        formal = [math.hypot(max(held_out, fit), spread) for held_out, fit, spread in parts]
+        distance = abs(values[0] - nominal)
+        bias = thresholds.aligned / support[effect].dominance * distance
+        widest = max(formal[0], WIDEST * distance / thresholds.wider)
+        errors.append((min(math.hypot(formal[0], bias), widest), *formal[1:]))
+    return errors
 
 
 def _shares(
-    fit: Fit, kept: Sequence[Effect], evidence: Evidence, posterior: Posterior
+    fit: Fit, named: Sequence[Effect], evidence: Evidence, posterior: Posterior
 ) -> dict[Effect, float]:
-    """Share of the gap of each effect: what would come back without it, of what would for all."""
+    """Split the explained share of the gap's power among effects.
+
+    The parts are proportional to the misfit that returns when each effect alone is left out.
+    """
     explained = min(max(1.0 - (1.0 - posterior.closes(posterior.best)) ** 2, 0.0), 1.0)
-    if len(kept) <= 1:
-        return dict.fromkeys(kept, explained)
+    if len(named) <= 1:
+        return dict.fromkeys(named, explained)
 
     def misfit(effects: Sequence[Effect]) -> float:
         plant: Plant = with_effects(evidence.plant, fit, effects)
         return float((evidence.residual(plant) ** 2).sum())
 
-    whole = misfit(kept)
-    lost = [
-        max(misfit([other for other in kept if other != effect]) - whole, 0.0) for effect in kept
+    whole = misfit(named)
+    # A share is negative where leaving an effect out happens to fit better; it counts as zero.
+    returned = [
+        max(misfit([other for other in named if other != effect]) - whole, 0.0) for effect in named
     ]
-    total = max(sum(lost), 1e-9)
-    return {effect: explained * one / total for effect, one in zip(kept, lost, strict=True)}
+    total = max(sum(returned), 1e-9)
+    return {
+        effect: explained * misfit_alone / total
+        for effect, misfit_alone in zip(named, returned, strict=True)
+    }
 
 
 def find_traces(
-    found: Explanation, kept: Sequence[Effect], evidence: Evidence, thresholds: Thresholds
+    explanation: Explanation, named: Sequence[Effect], evidence: Evidence, thresholds: Thresholds
 ) -> tuple[Finding, ...]:
-    """Effects that may be there beside those that are named, but are not sure enough to be named.
+    """Find effects that may be present beside the named ones but are too uncertain to be named.
 
     Parameters
     ----------
-    found
-        Everything that was tried.
-    kept
+    explanation
+        Result of the search.
+    named
         Effects that are named.
     evidence
-        The recordings.
+        Recordings that were fitted.
     thresholds
-        Numbers that it goes by.
+        Thresholds of the diagnosis.
 
     Returns
     -------
     tuple of Finding
-        Effects of the likeliest larger hypothesis, none if there is none.
+        Additional effects of the likeliest hypothesis that contains all named ones and more. Empty
+        where no such hypothesis has a noticeable weight.
     """
-    named = set(kept)
-    for each in found.posterior.ranking:
-        scored, effects = each.scored, set(each.scored.fit.effects)
-        if each.weight < SHOWN or not named < effects:
+    posterior, named_set = explanation.posterior, set(named)
+    for hypothesis in posterior.ranking:
+        scored, effects = hypothesis.scored, set(hypothesis.scored.fit.effects)
+        if hypothesis.weight < TRACE_WEIGHT or not named_set < effects:
             continue
-        more = [effect for effect in scored.fit.effects if effect not in named]
-        gained = found.posterior.closes(scored) - found.posterior.closes(found.posterior.best)
+        additional = [effect for effect in scored.fit.effects if effect not in named_set]
+        gained = posterior.closes(scored) - posterior.closes(posterior.best)
         return tuple(
             Finding(
                 name=_name(effect),
                 parameters=estimates(effect, values, widths, evidence, thresholds.wider),
-                confidence=found.posterior.inclusion(effect),
+                confidence=posterior.inclusion(effect),
                 alternatives=(_name(effect),),
-                share=max(gained, 0.0) / len(more),
+                share=max(gained, 0.0) / len(additional),
                 title=effect.kind.title,
             )
             for effect, values, widths in zip(
                 scored.fit.effects, scored.fit.values, scored.widths, strict=True
             )
-            if effect in more
+            if effect in additional
         )
     return ()
 
 
-def find_nearest(found: Explanation, evidence: Evidence) -> Nearest | None:
-    """Find the explanation that comes nearest to something that has no name.
+def find_nearest(explanation: Explanation, evidence: Evidence) -> Nearest | None:
+    """Find the best explanation of a gap for which no effect can be named.
 
     Parameters
     ----------
-    found
-        Everything that was tried.
+    explanation
+        Result of the search.
     evidence
-        The recordings.
+        Recordings that were fitted.
 
     Returns
     -------
     Nearest or None
-        The best hypothesis with any effect, and what it leaves; None if none was tried.
+        The best hypothesis with any effect, and its residual. None where no effect was fitted.
     """
-    tried = [each.scored.fit for each in found.posterior.ranking if each.scored.fit.effects]
-    if not tried:
+    fits = [
+        hypothesis.scored.fit
+        for hypothesis in explanation.posterior.ranking
+        if hypothesis.scored.fit.effects
+    ]
+    if not fits:
         return None
-    left, without = (
+    residual, without = (
         float((relative_errors(evidence, plant) ** 2).mean() ** 0.5)
-        for plant in (tried[0].plant, evidence.plant)
+        for plant in (fits[0].plant, evidence.plant)
     )
-    return Nearest(tuple(_name(effect) for effect in tried[0].effects), left, without)
+    return Nearest(tuple(_name(effect) for effect in fits[0].effects), residual, without)
 
 
 def _name(effect: Effect) -> Name:
@@ -270,26 +316,26 @@ def estimates(
     evidence: Evidence,
     wider: float = STANDARD.wider,
 ) -> dict[str, Estimate]:
-    """The parameters of an effect as fitted, with their intervals.
+    """Return the fitted parameters of an effect with their intervals.
 
     Parameters
     ----------
     effect
-        That was fitted.
+        Effect that was fitted.
     values, widths
-        Of its parameters, and their standard deviations.
+        Values of its parameters and their standard errors, SI.
     evidence
-        That it was fitted to.
+        Recordings that were fitted.
     wider
-        Standard deviations to either side.
+        Half width of an interval in standard errors.
 
     Returns
     -------
     dict
-        Parameter → estimate, of those that the recordings show anything of.
+        Parameter name → estimate, for the parameters that the recordings determine.
     """
     nominal = effect.nominal(evidence.plant)
-    # A delay cannot be known better than when in a tick the samples were taken.
+    # The instant of sampling within a tick is a tolerance, so no delay is known better than that.
     timing = max((evidence.width(t) for t in evidence.machine.tolerances if t.ticks), default=0.0)
     least = {"delay": timing / wider}
     return {
@@ -303,45 +349,106 @@ def estimates(
         for (name, quantity), value, width in zip(
             effect.quantities().items(), values, widths, strict=True
         )
-        # A place along an axis that no motion here shows was never fitted, and is not known.
+        # A secondary parameter of width zero was not fitted: no recorded motion depends on it.
         if width > 0.0 or name == effect.kind.parameters[0]
     }
 
 
-def describe_sensor(each: SensorProperty, evidence: Evidence, sure: float) -> Finding:
-    """A property that was read off a sensor's own signal."""
-    effect = find(f"{each.kind}@{each.component}", evidence.plant)
-    unit = evidence.machine.unit(effect.group, effect.quantities()[each.parameter])
-    spread = 0.05 * each.value
-    estimate = Estimate(each.value, each.value - spread, each.value + spread, each.nominal, unit)
-    name = Name(each.component, each.kind)
-    return Finding(name, {each.parameter: estimate}, sure, (name,), 1.0, effect.kind.title)
+def describe_sensor(measured: SensorProperty, evidence: Evidence, confidence: float) -> Finding:
+    """Describe a property that is read off a sensor's own signal, such as its noise.
 
+    Parameters
+    ----------
+    measured
+        Property of the sensor, in the sensor's unit.
+    evidence
+        Recordings that were read.
+    confidence
+        Confidence of the finding.
 
-def describe_controller(each: Deviation, sure: float) -> Finding:
-    """Something that the controller did other than told."""
-    name = Name("controller", each.kind)
-    spread = 1e-3 * abs(each.used)
-    estimate = Estimate(each.used, each.used - spread, each.used + spread, each.told, each.unit)
-    return Finding(name, {each.name: estimate}, sure, (name,), 1.0, title(each.kind))
-
-
-def describe_slight(each: Deviation) -> str:
-    """What the controller did other than told, if nothing comes of it."""
-    share = f"{100 * each.consequence:.1g} %"
-    if each.kind == "unknown":
-        return f"the controller's commands differ by {share} from those of its settings; no gap"
-    used, told = tell_apart(each.used, each.told)
-    unit = "" if each.unit == "1" else f" {each.unit}"
-    return (
-        f"the controller's {each.name} is {used}{unit} instead of {told}{unit}, "
-        f"which changes no command by more than {share}; no gap"
+    Returns
+    -------
+    Finding
+        Finding with no rivals: no other effect changes a signal in this way.
+    """
+    effect = find(f"{measured.kind}@{measured.component}", evidence.plant)
+    unit = evidence.machine.unit(effect.group, effect.quantities()[measured.parameter])
+    spread = READING_ERROR * measured.value
+    estimate = Estimate(
+        measured.value, measured.value - spread, measured.value + spread, measured.nominal, unit
+    )
+    name = Name(measured.component, measured.kind)
+    return Finding(
+        name, {measured.parameter: estimate}, confidence, (name,), 1.0, effect.kind.title
     )
 
 
-def list_unobservable(found: Explanation, effects: Sequence[Finding]) -> tuple[Unobservable, ...]:
-    """List the effects that these data could not show, whatever their size."""
-    why = "no size tried changes these data by more than their noise"
-    named = {(effect.name.component, effect.name.kind) for effect in effects}
-    unseen = [Unobservable(each.component, each.kind.name, why) for each in found.unobservable]
-    return tuple(each for each in unseen if (each.component, each.kind) not in named)
+def describe_controller(deviation: Deviation, confidence: float) -> Finding:
+    """Describe a setting that the controller did not use as configured.
+
+    Parameters
+    ----------
+    deviation
+        Setting, its configured value and the value that reproduces the recorded commands.
+    confidence
+        Confidence of the finding.
+
+    Returns
+    -------
+    Finding
+        Finding at the component "controller".
+    """
+    name = Name("controller", deviation.kind)
+    spread = SETTING_ERROR * abs(deviation.used)
+    estimate = Estimate(
+        deviation.used,
+        deviation.used - spread,
+        deviation.used + spread,
+        deviation.told,
+        deviation.unit,
+    )
+    return Finding(
+        name, {deviation.name: estimate}, confidence, (name,), 1.0, title(deviation.kind)
+    )
+
+
+def describe_negligible(deviation: Deviation) -> str:
+    """Describe a deviation of the controller that is too small to cause a gap, as a note."""
+    share = f"{100 * deviation.consequence:.1g} %"
+    if deviation.kind == "unknown":
+        return (
+            f"the controller's commands differ by {share} from those of its settings; "
+            "this causes no gap"
+        )
+    used, configured = format_distinct(deviation.used, deviation.told)
+    unit = "" if deviation.unit == "1" else f" {deviation.unit}"
+    return (
+        f"the controller's {deviation.name} is {used}{unit} instead of {configured}{unit}, "
+        f"which changes no command by more than {share}; this causes no gap"
+    )
+
+
+def list_unobservable(
+    explanation: Explanation, findings: Sequence[Finding]
+) -> tuple[Unobservable, ...]:
+    """List the effects that the recordings could not show at any size.
+
+    Parameters
+    ----------
+    explanation
+        Result of the search.
+    findings
+        Findings, which are left out of the list.
+
+    Returns
+    -------
+    tuple of Unobservable
+        Effects with the reason.
+    """
+    why = "at no size that was tried does it change these data by more than their noise"
+    named = {(finding.name.component, finding.name.kind) for finding in findings}
+    return tuple(
+        Unobservable(effect.component, effect.kind.name, why)
+        for effect in explanation.unobservable
+        if (effect.component, effect.kind.name) not in named
+    )

@@ -1,5 +1,8 @@
-"""What can be said before anything is fitted: how large the gap is, in which sensors, and which
-effects promise to explain it, each alone and to first order."""
+"""First look: the size of the gap and the likely effects, before anything is fitted.
+
+Every effect is tried alone, and its benefit is extrapolated to first order from a small change. The
+final diagnosis fits the effects together and may name others.
+"""
 
 from __future__ import annotations
 
@@ -13,18 +16,25 @@ from rigtwin.diagnosis.finding import Name
 from rigtwin.diagnosis.fitter import Fitter, Screened
 from rigtwin.diagnosis.thresholds import Thresholds
 
-NAMED = 6
-"""Suspects at most."""
-BESIDE = 0.3
-"""Share of what the foremost suspect promises from which another is one too."""
+MOST_SUSPECTS = 6
+"""Largest number of suspects."""
+COMPARABLE = 0.3
+"""Share of the best suspect's promise from which another effect is a suspect too."""
 
 
 @dataclass(frozen=True)
 class FirstLook:
-    """Of a diagnosis that goes on. gap: of each sensor, rms in noise floors, 1 is noise alone, the
-    largest first; suspects: effects and the share of the gap's power that each may explain alone,
-    the foremost first, none where there is no gap to speak of. The judgement may name others: what
-    is seen here is only what a small change would do."""
+    """Preliminary result of a running diagnosis.
+
+    Attributes
+    ----------
+    gap
+        Sensor → rms of measured minus predicted in noise floors (1 is noise alone), the largest
+        first.
+    suspects
+        Effects, and the share of the gap's power that each may explain alone, the largest first.
+        Empty where there is no gap.
+    """
 
     gap: dict[str, float]
     suspects: tuple[tuple[Name, float], ...]
@@ -32,7 +42,7 @@ class FirstLook:
     def __str__(self) -> str:
         levels = ", ".join(f"{name} {level:.3g}" for name, level in self.gap.items())
         if not self.suspects:
-            return f"no gap to speak of (noise floors: {levels})"
+            return f"no significant gap (noise floors: {levels})"
         named = ", ".join(f"{name} ({100 * share:.0f} %)" for name, share in self.suspects)
         return f"suspects {named}; noise floors: {levels}"
 
@@ -40,47 +50,50 @@ class FirstLook:
 def look_first(
     fitter: Fitter, screened: Sequence[Screened], least: float, thresholds: Thresholds
 ) -> FirstLook:
-    """The first look.
+    """Summarise the screening of all effects.
 
     Parameters
     ----------
     fitter
-        That screened.
+        Fitter that screened the effects.
     screened
         Every effect of the library, tried at the values from which a search for it starts.
     least
         χ² that an effect must explain to be a finding.
     thresholds
-        What figures are held against.
+        Thresholds of the diagnosis.
 
     Returns
     -------
     FirstLook
-        Its suspects.
+        Gap of each sensor, and the suspects.
     """
     evidence = fitter.evidence
     gap = fitter.nothing.misfit - evidence.expected
-    foremost = sorted(screened, key=lambda each: -each.promise)[:NAMED]
+    foremost = sorted(screened, key=lambda effect: -effect.promise)[:MOST_SUSPECTS]
     most = foremost[0].promise if foremost else 0.0
-    there = gap > thresholds.rest * evidence.expected or most > 2.0 * least
+    # A gap in few frequencies is lost in the χ² of all of them, but one effect still explains it.
+    has_gap = gap > thresholds.rest * evidence.expected or most > 2.0 * least
     suspects = [
         (
-            Name(each.effect.component, each.effect.kind.name),
-            min(each.promise / max(gap, most, 1e-300), 1.0),
+            Name(candidate.effect.component, candidate.effect.kind.name),
+            min(candidate.promise / max(gap, most, 1e-300), 1.0),
         )
-        for each in foremost
-        if there and each.promise >= max(least, BESIDE * most)
+        for candidate in foremost
+        if has_gap and candidate.promise >= max(least, COMPARABLE * most)
     ]
     return FirstLook(_levels(evidence), tuple(suspects))
 
 
 def _levels(evidence: Evidence) -> dict[str, float]:
-    """Each sensor's gap over all recordings."""
+    """Gap of each sensor over all recordings, in noise floors."""
     powers = np.zeros(len(evidence.names))
     ticks = 0
-    for each, left in zip(evidence.lines, evidence.differences(evidence.plant), strict=True):
-        counts = each.fade.max(axis=0) > 0.5
-        powers += np.sum((left[:, counts] / each.noise[:, None]) ** 2, axis=1)
+    for recorded, residual in zip(
+        evidence.lines, evidence.differences(evidence.plant), strict=True
+    ):
+        counts = recorded.fade.max(axis=0) > 0.5
+        powers += np.sum((residual[:, counts] / recorded.noise[:, None]) ** 2, axis=1)
         ticks += int(counts.sum())
     levels = np.sqrt(powers / max(ticks, 1))
     order = np.argsort(-levels)

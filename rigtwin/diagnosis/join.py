@@ -1,4 +1,8 @@
-"""The answers to a machine's parts as one answer to the whole."""
+"""Join the diagnoses of a machine's independent parts to one diagnosis of the machine.
+
+Joints that do not act on each other are diagnosed part by part. A share of a part's gap becomes a
+share of the machine's gap by the part's weight w_i, with Σ w_i = 1.
+"""
 
 from __future__ import annotations
 
@@ -18,34 +22,34 @@ from rigtwin.diagnosis.result import Diagnosis
 from rigtwin.diagnosis.text import sentence
 
 Item = TypeVar("Item")
-FIRST = 2
-"""Explanations of each part that the whole's ranking has."""
+RANKED = 2
+"""Explanations of each part that enter the machine's ranking."""
 
 
 def join(
-    evidence: Evidence, held_out: Evidence | None, found: Sequence[Diagnosis], started: float
+    evidence: Evidence, held_out: Evidence | None, parts: Sequence[Diagnosis], started: float
 ) -> Diagnosis:
-    """The diagnosis of a machine whose parts were diagnosed each by itself.
+    """Join the diagnoses of all parts.
 
     Parameters
     ----------
     evidence
-        Of the whole machine.
+        Recordings of the whole machine.
     held_out
-        The same of the recordings that it was judged on, None without any.
-    found
-        Of its parts, which share no component that was changed.
+        Held-out recordings of the whole machine. None without any.
+    parts
+        Diagnoses of the parts. No two of them changed the same component.
     started
-        When the diagnosis began, as `time.perf_counter` has it.
+        Time at which the diagnosis began, s, by `time.perf_counter`.
 
     Returns
     -------
     Diagnosis
-        Findings, places and notes of all parts; shares are of the whole gap.
+        Findings, places and notes of all parts, with shares of the machine's gap.
     """
-    answers = [each.answer for each in found]
-    corrected = found[0].corrected._replace(plant=_merge(evidence.plant, found))
-    weights = _weights(found)
+    answers = [part.answer for part in parts]
+    corrected = parts[0].corrected._replace(plant=_merge_plants(evidence.plant, parts))
+    weights = _weights(parts)
     gap = _join_gaps(evidence, corrected.plant, answers, weights)
     effects = tuple(
         replace(effect, share=weight * effect.share)
@@ -67,9 +71,9 @@ def join(
         effects=effects,
         where=tuple(where),
         gap=gap,
-        ranking=tuple(_chain(answer.ranking[:FIRST] for answer in answers)),
-        not_observable=tuple(_chain(answer.not_observable for answer in answers)),
-        notes=tuple(_chain(answer.notes for answer in answers)),
+        ranking=tuple(_unique(answer.ranking[:RANKED] for answer in answers)),
+        not_observable=tuple(_unique(answer.not_observable for answer in answers)),
+        notes=tuple(_unique(answer.notes for answer in answers)),
         recordings=answers[0].recordings,
         seconds=time.perf_counter() - started,
         machine=evidence.machine.name,
@@ -81,57 +85,61 @@ def join(
         if verdict == "unknown"
         else None,
     )
-    otherwise = tuple(pair for each in found for pair in each.otherwise)
+    otherwise = tuple(pair for part in parts for pair in part.otherwise)
     return Diagnosis(answer, evidence.machine, evidence, corrected, otherwise, held_out)
 
 
-def _chain(groups: Iterable[Iterable[Item]]) -> list[Item]:
-    """All of them in order, each once."""
+def _unique(groups: Iterable[Iterable[Item]]) -> list[Item]:
+    """Items of all groups in order, without repetition."""
     return list(dict.fromkeys(item for group in groups for item in group))
 
 
 def _join_steps(answers: Sequence[Answer]) -> tuple[Step, ...]:
-    """What each part's effects leave of all signals, part after part, the nominal machine first."""
+    """Steps of all parts in sequence, each with the residuals of all signals of the machine."""
     chains = [answer.steps for answer in answers if answer.steps]
     if not chains:
         return ()
-    left = {name: value for chain in chains for name, value in chain[0].left.items()}
-    found = [replace(chains[0][0], left=left)]
+    residual = {name: value for chain in chains for name, value in chain[0].residual.items()}
+    joined = [replace(chains[0][0], residual=residual)]
     for chain in chains:
         for step in chain[1:]:
-            left = {**left, **step.left}
-            found.append(replace(step, left=left))
-    return tuple(found)
+            # A part's effects change its own signals; the others keep the level of the last step.
+            residual = {**residual, **step.residual}
+            joined.append(replace(step, residual=residual))
+    return tuple(joined)
 
 
-def _merge(plant: Plant, found: Sequence[Diagnosis]) -> Plant:
-    """The plant with what each part changed of it."""
+def _merge_plants(plant: Plant, parts: Sequence[Diagnosis]) -> Plant:
+    """Plant with the components that any part changed."""
     changed = {
         name: component
-        for each in found
-        for name, component in each.corrected.plant._asdict().items()
+        for part in parts
+        for name, component in part.corrected.plant._asdict().items()
         if component != getattr(plant, name)
     }
     return plant._replace(**changed)
 
 
-def _weights(found: Sequence[Diagnosis]) -> list[float]:
-    """Each part's share of the whole gap, its signals in units of their own: noise differs too much
-    from joint to joint to compare them by it."""
+def _weights(parts: Sequence[Diagnosis]) -> list[float]:
+    """Share of the machine's gap of each part.
+
+    Signals are taken relative to their own amplitude. In noise floors the joint with the best
+    sensor would outweigh all others.
+    """
     powers = []
-    for each in found:
-        evidence = each.evidence
+    for part in parts:
+        evidence = part.evidence
         assert evidence is not None
         errors = relative_errors(evidence, evidence.plant)
         powers.append(len(evidence.names) * float(np.mean(np.square(errors))))
-    whole = max(sum(powers), 1e-300)
-    return [power / whole for power in powers]
+    total = max(sum(powers), 1e-300)
+    return [power / total for power in powers]
 
 
 def _join_verdicts(verdicts: Sequence[Verdict], named: bool) -> Verdict:
     if named:
-        whole = all(verdict in ("explained", "no gap") for verdict in verdicts)
-        return "explained" if whole else "partly explained"
+        complete = all(verdict in ("explained", "no gap") for verdict in verdicts)
+        return "explained" if complete else "partly explained"
     return "unknown" if "unknown" in verdicts else "no gap"
 
 
@@ -140,20 +148,23 @@ def _join_gaps(
 ) -> Gap:
     gaps = [answer.gap for answer in answers if answer.gap is not None]
 
-    def shrink(of: Callable[[Gap], float]) -> float:
-        left = sum(w * (1.0 - of(gap)) ** 2 for w, gap in zip(weights, gaps, strict=True))
-        return 1.0 - math.sqrt(left) if sum(weights) > 0.0 else 0.0
+    def join_shrinkage(shrinkage: Callable[[Gap], float]) -> float:
+        # Amplitudes add as powers: 1 - s = sqrt(Σ w_i (1 - s_i)^2).
+        remaining = sum(
+            w * (1.0 - shrinkage(gap)) ** 2 for w, gap in zip(weights, gaps, strict=True)
+        )
+        return 1.0 - math.sqrt(remaining) if sum(weights) > 0.0 else 0.0
 
     return Gap(
         before=gap_level(evidence, evidence.plant),
         after=gap_level(evidence, plant),
         floor=1.0,
-        shrinkage_predicted=shrink(lambda gap: gap.shrinkage_predicted),
-        # Each part's ends together: wider than what chance would make of their sum.
+        shrinkage_predicted=join_shrinkage(lambda gap: gap.shrinkage_predicted),
+        # All low ends together and all high ends together: wider than independent parts would give.
         shrinkage_held_out=Interval(
-            shrink(lambda gap: gap.shrinkage_held_out.value),
-            shrink(lambda gap: gap.shrinkage_held_out.low),
-            shrink(lambda gap: gap.shrinkage_held_out.high),
+            join_shrinkage(lambda gap: gap.shrinkage_held_out.value),
+            join_shrinkage(lambda gap: gap.shrinkage_held_out.low),
+            join_shrinkage(lambda gap: gap.shrinkage_held_out.high),
         ),
         held_out=gaps[0].held_out,
         replays={name: level for gap in gaps for name, level in gap.replays.items()},

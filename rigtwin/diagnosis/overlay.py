@@ -1,5 +1,4 @@
-"""Measured, nominal and corrected signals beside each other, sensor by sensor: what a diagnosis
-says, in the engineer's own data."""
+"""Measured, nominal and corrected signals of every sensor, as the report overlays them."""
 
 from __future__ import annotations
 
@@ -13,20 +12,33 @@ from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.numerics.arrays import Array
 
 LOOKED_AT = 1.0
-"""s, the stretch that is shown first."""
+"""Duration of the stretch that is in view at first, s."""
 COUNTS = 0.5
-"""Weight of a tick from which it counts in errors."""
+"""Weight from which a tick counts in an error."""
 
 
 @dataclass(frozen=True)
 class Overlay:
-    """One sensor of one recording.
+    """One sensor of one recording: measured, nominal and corrected.
 
-    recording: its file's name; held_out: whether the correction was not fitted to it; sensor, kind
-    and unit: as the machine's rows have them; time: s; measured, nominal, corrected: in that unit,
-    shape (ticks,), as the model predicts them (in its band, mains line taken out); counts: ticks
-    whose state is known; noise: rms, in
-    the unit.
+    All signals are in the band of the model, without the mains line, so that they can be compared.
+
+    Attributes
+    ----------
+    recording
+        File name of the recording.
+    held_out
+        Whether the correction was fitted without this recording.
+    sensor, kind, unit
+        Name of the sensor, its kind and the SI unit of its signal.
+    time
+        Time, s, shape (ticks,).
+    measured, nominal, corrected
+        Signals in `unit`, shape (ticks,).
+    counts
+        Weight of each tick, 0 to 1, shape (ticks,); 0 where the state of the model is not known.
+    noise
+        Rms noise of the sensor, in `unit`.
     """
 
     recording: str
@@ -41,43 +53,47 @@ class Overlay:
     counts: Array
     noise: float
 
-    def _rms(self, predicted: Array) -> float:
-        left = (self.measured - predicted)[self.counts > COUNTS]
-        return float(np.sqrt(np.mean(left**2))) if len(left) else 0.0
+    def _rms_residual(self, predicted: Array) -> float:
+        residual = (self.measured - predicted)[self.counts > COUNTS]
+        return float(np.sqrt(np.mean(residual**2))) if len(residual) else 0.0
 
     @property
     def swing(self) -> float:
-        """Standard deviation of what was measured, at least its noise, in its unit."""
-        there = self.measured[self.counts > COUNTS]
-        return max(float(np.std(there)) if len(there) else 0.0, self.noise)
+        """Standard deviation of the measured signal in `unit`; at least the sensor's noise."""
+        counted = self.measured[self.counts > COUNTS]
+        # A sensor that stands still would have an infinite error in percent.
+        return max(float(np.std(counted)) if len(counted) else 0.0, self.noise)
 
     @property
     def before(self) -> float:
-        """rms of measured less nominal, in the sensor's unit."""
-        return self._rms(self.nominal)
+        """Rms of measured minus nominal, in `unit`."""
+        return self._rms_residual(self.nominal)
 
     @property
     def after(self) -> float:
-        """rms of measured less corrected, in the sensor's unit."""
-        return self._rms(self.corrected)
+        """Rms of measured minus corrected, in `unit`."""
+        return self._rms_residual(self.corrected)
 
     @property
     def before_percent(self) -> float:
-        """The same in percent of the measured signal's standard deviation."""
+        """Rms of measured minus nominal, in percent of `swing`."""
         return 100.0 * self.before / self.swing
 
     @property
     def after_percent(self) -> float:
-        """The same in percent of the measured signal's standard deviation."""
+        """Rms of measured minus corrected, in percent of `swing`."""
         return 100.0 * self.after / self.swing
 
     @property
     def worst(self) -> tuple[float, float]:
-        """First and last time, s, of the second in which the corrected prediction is worst; where
-        nothing was corrected, that is the nominal one."""
+        """First and last time, s, of the second with the largest error of the corrected signal.
+
+        Without a correction, the corrected signal is the nominal one.
+        """
         period = float(self.time[1] - self.time[0]) if len(self.time) > 1 else 1.0
         ticks = min(max(round(LOOKED_AT / period), 1), len(self.time))
         power = (self.counts > COUNTS) * (self.measured - self.corrected) ** 2
+        # Differences of the cumulative sum are the sums over all windows of that length.
         sums = np.concatenate([[0.0], np.cumsum(power)])
         start = int(np.argmax(sums[ticks:] - sums[:-ticks]))
         return float(self.time[start]), float(self.time[start + ticks - 1])
@@ -86,31 +102,31 @@ class Overlay:
 def overlay(
     evidence: Evidence, corrected: Plant, held_out: Evidence | None = None
 ) -> tuple[Overlay, ...]:
-    """Every observed sensor of every recording as measured and as predicted.
+    """Overlay every observed sensor of every recording with its predictions.
 
     Parameters
     ----------
     evidence
-        What the diagnosis was made of.
+        Recordings that were fitted.
     corrected
-        The plant with what was found.
+        Corrected plant.
     held_out
-        Recordings that it was not fitted to.
+        Recordings that the correction was not fitted to. None without any.
 
     Returns
     -------
     tuple of Overlay
-        Held-out recordings first; in each, the sensor with the largest gap in units of its noise
-        first.
+        Overlays of the held-out recordings first. Within a recording, the sensor with the largest
+        gap in noise floors comes first.
     """
-    found: list[Overlay] = []
+    overlays: list[Overlay] = []
     if held_out is not None:
-        found += _overlay_each(held_out, corrected, True)
-    return (*found, *_overlay_each(evidence, corrected, False))
+        overlays += _overlay_recordings(held_out, corrected, True)
+    return (*overlays, *_overlay_recordings(evidence, corrected, False))
 
 
-def _overlay_each(evidence: Evidence, corrected: Plant, held_out: bool) -> Sequence[Overlay]:
-    found: list[Overlay] = []
+def _overlay_recordings(evidence: Evidence, corrected: Plant, held_out: bool) -> Sequence[Overlay]:
+    overlays: list[Overlay] = []
     for recording, lines, nominal, after in zip(
         evidence.recordings,
         evidence.lines,
@@ -119,7 +135,7 @@ def _overlay_each(evidence: Evidence, corrected: Plant, held_out: bool) -> Seque
         strict=True,
     ):
         ticks = lines.measured.shape[1]
-        each = [
+        of_recording = [
             Overlay(
                 recording=recording.path.name,
                 held_out=held_out,
@@ -135,5 +151,5 @@ def _overlay_each(evidence: Evidence, corrected: Plant, held_out: bool) -> Seque
             )
             for index, row in enumerate(evidence.machine.rows)
         ]
-        found += sorted(each, key=lambda one: -one.before / one.noise)
-    return found
+        overlays += sorted(of_recording, key=lambda sensor: -sensor.before / sensor.noise)
+    return overlays

@@ -1,7 +1,7 @@
-"""The picture that shows an effect in the data: which one a kind of effect has, and its numbers.
+"""Pictures that show each effect in the data: the kind of picture, and its numbers.
 
-An effect is shown alone: `before` is the prediction with everything that was found but this effect,
-`after` the one with it too. What the effect is, is the step from one to the other; the data say
+An effect is shown alone: `before` is the prediction with every named effect except this one,
+`after` the prediction with it too. The step from one to the other is the effect; the data show
 whether they make the same step.
 """
 
@@ -13,36 +13,54 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rigtwin.components import with_parameters
 from rigtwin.components.effect import GROUPS, Motion
 from rigtwin.components.plant import Plant
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.finding import Finding
+from rigtwin.diagnosis.localisation import is_angular
 from rigtwin.diagnosis.overlay import COUNTS, LOOKED_AT
+from rigtwin.diagnosis.words import name_part
 from rigtwin.numerics.arrays import Array
 
 BINS = 30
-"""Of what a residual is drawn against."""
+"""Bins of the axis against which a residual is drawn."""
 FEWEST = 12
 """Ticks that a bin must hold to be drawn."""
 AGREES = 0.1
-"""Share by which what the data ask for may differ from what was found and agree with it."""
+"""Relative difference between the fitted size of an effect and that of the nominal one below which
+they agree."""
+CYCLE_FACTOR = 2.2
+"""Length of a drawn loop in half strokes: one stroke to and fro, and a little more."""
 LONGEST_CYCLE = 10.0
-"""s of a loop that is drawn."""
+"""Longest loop that is drawn, s."""
 POINTS = 1500
-"""Of a cloud."""
+"""Points of a cloud at most."""
 EXTREME = 0.004
-"""Share of the ticks at either end that no axis reaches out to."""
-SEEN = 0.02
-"""Share of its greatest amplitude from which a signal's phase is known at a frequency."""
+"""Share of the ticks at either end that lies outside of the axis."""
+VISIBLE = 0.02
+"""Amplitude, relative to the largest, from which a signal's phase at a frequency is drawn."""
 RESPONDS = 40.0
-"""Hz, up to which a response is drawn."""
+"""Frequency up to which a response is drawn, Hz."""
+SEGMENT, SHORTEST_SEGMENT = 2.0, 64
+"""Length of the segments of a spectrum, s, and the fewest ticks of one."""
 
 
 @dataclass(frozen=True)
-class Curve:
-    """One line or cloud. role: measured, before or after; x, y: in the picture's units."""
+class PictureCurve:
+    """One line or cloud of points of a picture.
+
+    Attributes
+    ----------
+    role
+        "measured", "before", "after" or "samples".
+    x, y
+        Coordinates in the picture's units, shape (points,).
+    points
+        True for a cloud of points, False for a line.
+    """
 
     role: str
     x: Array
@@ -54,9 +72,22 @@ class Curve:
 class Picture:
     """An effect in the data.
 
-    effect: kind@component; form: the picture's name in `FORMS`; recording and sensor: that it is
-    of; x, y and their units; curves; logarithmic: which axes are; caption: what to see in it, a
-    sentence.
+    Attributes
+    ----------
+    effect
+        Name of the effect, `kind@component`.
+    form
+        Form of the picture, a key of `FORMS`.
+    recording, sensor
+        Recording and sensor that it shows.
+    x, x_unit, y, y_unit
+        Labels and SI units of the axes.
+    curves
+        Lines and clouds.
+    logarithmic
+        Whether the x axis and the y axis are logarithmic.
+    caption
+        Sentences that tell what to see in it.
     """
 
     effect: str
@@ -67,17 +98,35 @@ class Picture:
     x_unit: str
     y: str
     y_unit: str
-    curves: tuple[Curve, ...]
+    curves: tuple[PictureCurve, ...]
     logarithmic: tuple[bool, bool]
     caption: str
 
 
 @dataclass(frozen=True)
 class View:
-    """What a picture is made of: one sensor of one recording, with and without an effect.
+    """Data of a picture: one sensor of one recording, with and without an effect.
 
-    raw: as recorded, with its mains line; motion: of the effect's component; angular: whether it
-    turns; counts: ticks that count; all signals of shape (ticks,); period: s.
+    Attributes
+    ----------
+    effect
+        Effect that is shown.
+    recording, sensor, kind, unit
+        Name of the recording, name and kind of the sensor, and the SI unit of its signal.
+    angular
+        Whether the effect's component turns.
+    time
+        Time, s, shape (ticks,).
+    raw
+        Signal as recorded, with its mains hum, in `unit`, shape (ticks,).
+    measured, before, after
+        Signal, and predictions without and with the effect, in `unit`, shape (ticks,).
+    motion
+        Motion of the effect's component.
+    counts
+        Weight of each tick, 0 to 1, shape (ticks,).
+    period
+        Duration of a tick, s.
     """
 
     effect: Finding
@@ -97,28 +146,38 @@ class View:
 
     @property
     def part(self) -> str:
-        return self.effect.name.component.replace("_", " ")
+        """Component of the effect in words."""
+        return name_part(self.effect.name.component)
 
     @property
     def sensor_name(self) -> str:
-        return self.sensor.replace("_", " ")
+        """Sensor in words."""
+        return name_part(self.sensor)
+
+    @property
+    def counted(self) -> NDArray[np.bool_]:
+        """Ticks that count, shape (ticks,)."""
+        return self.counts > COUNTS
 
 
-def _weigh(view: View) -> str:
-    """How much of the effect the data of this picture ask for."""
-    there = view.counts > COUNTS
-    step = (view.after - view.before)[there]
-    power = float(step @ step)
+def _compare_size(view: View) -> str:
+    """Sentence on the size of the effect in this recording, relative to the fitted one.
+
+    It is the slope of a regression of the residual on the effect's own response d,
+    dᵀ(measured - before) / dᵀd; 1 if the recording agrees with the fit.
+    """
+    response = (view.after - view.before)[view.counted]
+    power = float(response @ response)
     if power <= 0.0:
         return ""
-    share = float(step @ (view.measured - view.before)[there]) / power
-    if abs(share - 1.0) < AGREES:
-        return f" {view.recording} asks for as much of it as was found."
-    return f" {view.recording} asks for {share:.2f} times what was found."
+    ratio = float(response @ (view.measured - view.before)[view.counted]) / power
+    if abs(ratio - 1.0) < AGREES:
+        return f" In {view.recording} the effect has the fitted size."
+    return f" In {view.recording} the effect has {ratio:.2f} times the fitted size."
 
 
 def _stretch(view: View, weight: Array, seconds: float) -> slice:
-    """Ticks of the stretch of that length over which a weight, shape (ticks,), is greatest."""
+    """Ticks of the stretch of that length with the largest sum of a weight, shape (ticks,)."""
     ticks = min(max(round(seconds / view.period), 2), len(view.time))
     sums = np.concatenate([[0.0], np.cumsum(weight)])
     start = int(np.argmax(sums[ticks:] - sums[:-ticks]))
@@ -126,15 +185,15 @@ def _stretch(view: View, weight: Array, seconds: float) -> slice:
 
 
 def _cycle(view: View) -> float:
-    """s, of one motion to and fro, from 1 to 10; of what hardly reverses 1."""
+    """Duration of one stroke to and fro, 1 to 10 s; 1 s for a motion that hardly reverses."""
     speed = view.motion.speed
     turns = np.flatnonzero(np.diff(np.sign(speed - np.mean(speed))) != 0)
     if len(turns) < 3:
         return LOOKED_AT
-    apart = np.diff(turns) * view.period
-    # Noise about standstill reverses too; the strokes are what takes most of the time.
-    typical = float(np.sum(apart**2) / np.sum(apart))
-    return min(max(2.2 * typical, LOOKED_AT), LONGEST_CYCLE)
+    strokes = np.diff(turns) * view.period
+    # Noise at standstill reverses too. Weighted by their duration, the strokes outweigh it.
+    typical = float(np.sum(strokes**2) / np.sum(strokes))
+    return min(max(CYCLE_FACTOR * typical, LOOKED_AT), LONGEST_CYCLE)
 
 
 def _picture(
@@ -142,7 +201,7 @@ def _picture(
     form: str,
     x: tuple[str, str],
     y: tuple[str, str],
-    curves: list[Curve],
+    curves: list[PictureCurve],
     caption: str,
     logarithmic: tuple[bool, bool] = (False, False),
 ) -> Picture:
@@ -162,11 +221,14 @@ def _picture(
 def _against(
     view: View, along: Array, form: str, name: str, unit: str, along_what: str = ""
 ) -> Picture:
-    """What is left without the effect against something that the component goes through, and what
-    the effect says of it. along_what: in the caption, unless it is a quantity of the component."""
-    there = view.counts > COUNTS
-    along, left = along[there], (view.measured - view.before)[there]
-    law = (view.after - view.before)[there]
+    """Residual without the effect, and the effect's response, against a regressor.
+
+    along: regressor, shape (ticks,); name, unit: its label and SI unit; along_what: its name in the
+    caption, unless it is a quantity of the component.
+    """
+    counted = view.counted
+    along, residual = along[counted], (view.measured - view.before)[counted]
+    law = (view.after - view.before)[counted]
     low, high = np.quantile(along, [EXTREME, 1.0 - EXTREME])
     edges = np.linspace(low, high, BINS + 1)
     place = np.digitize(along, edges) - 1
@@ -179,16 +241,16 @@ def _against(
 
     within = (along[::every] >= low) & (along[::every] <= high)
     curves = [
-        Curve("samples", along[::every][within], left[::every][within], points=True),
-        Curve("before", np.array([low, high]), np.zeros(2)),
-        Curve("after", centres[filled], average(law)),
-        Curve("measured", centres[filled], average(left), points=True),
+        PictureCurve("samples", along[::every][within], residual[::every][within], points=True),
+        PictureCurve("before", np.array([low, high]), np.zeros(2)),
+        PictureCurve("after", centres[filled], average(law)),
+        PictureCurve("measured", centres[filled], average(residual), points=True),
     ]
     caption = (
-        f"What the {view.sensor_name} measured beyond the prediction without {view.effect.name}, "
-        f"against {along_what or f'the {name} of the {view.part}'}: the dots (averages of the "
-        "data) should lie on the solid line, which is what the effect predicts, and not on zero."
-        f"{_weigh(view)}"
+        f"Residual of the {view.sensor_name} without {view.effect.name}, against "
+        f"{along_what or f'the {name} of the {view.part}'}. The dots (averages of the data) should "
+        "lie on the solid line, which is the response to the effect, and not on zero."
+        f"{_compare_size(view)}"
     )
     return _picture(
         view, form, (f"{name}", unit), (f"{view.sensor_name}, residual", view.unit), curves, caption
@@ -213,63 +275,69 @@ def _by_acceleration(view: View) -> Picture:
 
 def _over_record(view: View) -> Picture:
     along = view.time - view.time[0]
-    return _against(view, along, "record", "time", "s", "the time since the recording's first tick")
+    return _against(
+        view, along, "record", "time", "s", "the time since the first tick of the recording"
+    )
 
 
 def _loop(view: View) -> Picture:
-    """Force against displacement in the stroke to and fro that the effect changes most."""
-    change = (view.counts > COUNTS) * (view.after - view.before) ** 2
+    """Force against displacement in the stroke to and fro that the effect changes most.
+
+    Play, springs and compliance change the shape of this loop.
+    """
+    change = view.counted * (view.after - view.before) ** 2
     part = _stretch(view, change, _cycle(view))
     signals = {"measured": view.measured, "before": view.before, "after": view.after}
     length = "rad" if view.angular else "m"
     if view.kind == "force":
         x, y = (f"displacement of the {view.part}", length), (view.sensor_name, view.unit)
         curves = [
-            Curve(role, view.motion.position[part], signal[part])
+            PictureCurve(role, view.motion.position[part], signal[part])
             for role, signal in signals.items()
         ]
     else:
         force = "Nm" if view.angular else "N"
         x, y = (view.sensor_name, view.unit), (f"force at the {view.part}", force)
         curves = [
-            Curve(role, signal[part], view.motion.force[part]) for role, signal in signals.items()
+            PictureCurve(role, signal[part], view.motion.force[part])
+            for role, signal in signals.items()
         ]
     caption = (
-        f"Force against displacement, {view.time[part][0]:.2f} to {view.time[part][-1]:.2f} s: the "
-        f"loop with {view.effect.name} should lie on the measured one, the one without it should "
-        f"not.{_weigh(view)}"
+        f"Force against displacement, {view.time[part][0]:.2f} to {view.time[part][-1]:.2f} s. The "
+        f"loop predicted with {view.effect.name} should lie on the measured one, and the loop "
+        f"without it should not.{_compare_size(view)}"
     )
     return _picture(view, "loop", x, y, curves, caption)
 
 
 def _phase(view: View) -> Picture:
-    """Phase of what was measured, and of the prediction with the effect, behind the prediction
-    without it."""
-    from scipy.signal import csd, welch  # Late: they are of the report, and take their time.
+    """Phase of the measured signal and of the prediction with the effect, against that without it.
 
-    length = min(len(view.before), max(64, round(2.0 / view.period)))
-    there = view.counts > COUNTS
-    signals = {
-        "measured": view.measured[there],
-        "after": view.after[there],
-    }
-    base = view.before[there] - np.mean(view.before[there])
-    length = min(length, len(base))
+    The phase is that of the cross spectrum; a delay T is the straight line -2π f T.
+    """
+    # Imported here, because scipy.signal is slow to import and only a report needs it.
+    from scipy.signal import csd, welch
+
+    counted = view.counted
+    signals = {"measured": view.measured[counted], "after": view.after[counted]}
+    base = view.before[counted] - np.mean(view.before[counted])
+    length = _segment_length(view, len(base))
     frequency, power = welch(base, 1.0 / view.period, nperseg=length)
-    kept = (
+    # Where the signal has hardly any power the phase is that of noise, and would upset `unwrap`.
+    drawn = (
         (frequency > 0.0)
         & (frequency <= RESPONDS)
-        & (np.sqrt(power) >= SEEN * math.sqrt(float(np.max(power)) + 1e-300))
+        & (np.sqrt(power) >= VISIBLE * math.sqrt(float(np.max(power)) + 1e-300))
     )
-    curves = [Curve("before", frequency[kept], np.zeros(int(np.count_nonzero(kept))))]
+    curves = [PictureCurve("before", frequency[drawn], np.zeros(int(np.count_nonzero(drawn))))]
     for role in ("after", "measured"):
         _, cross = csd(base, signals[role], 1.0 / view.period, nperseg=length)
-        angle = np.unwrap(np.angle(cross[kept])) if kept.any() else np.zeros(0)
-        curves.append(Curve(role, frequency[kept], angle, points=role == "measured"))
+        angle = np.unwrap(np.angle(cross[drawn])) if drawn.any() else np.zeros(0)
+        curves.append(PictureCurve(role, frequency[drawn], angle, points=role == "measured"))
     caption = (
-        f"By how much the {view.sensor_name} lags the prediction without {view.effect.name}, "
-        "frequency by frequency: the dots are the data and should lie on the solid line, which is "
-        "the prediction with the effect (a delay is a straight line)."
+        f"Phase of the {view.sensor_name} against the prediction without {view.effect.name}. The "
+        "dots are the data and should lie on the solid line, which is the prediction with the "
+        "effect. A delay is a straight line."
     )
     return _picture(
         view=view,
@@ -282,28 +350,36 @@ def _phase(view: View) -> Picture:
     )
 
 
+def _segment_length(view: View, ticks: int) -> int:
+    """Ticks of one segment of Welch's method: 2 s, or the whole of a shorter recording."""
+    return min(ticks, max(SHORTEST_SEGMENT, round(SEGMENT / view.period)))
+
+
 def _line(view: View) -> Picture:
-    """Measured, and predicted with the effect, against predicted without it."""
-    there = view.counts > COUNTS
-    x, y, z = view.before[there], view.measured[there], view.after[there]
+    """Measured signal, and prediction with the effect, against the prediction without it.
+
+    A gain is a slope, an offset a shift and a saturation a plateau.
+    """
+    counted = view.counted
+    x, y, z = view.before[counted], view.measured[counted], view.after[counted]
     every = max(1, math.ceil(len(x) / POINTS))
     x, y, z = x[::every], y[::every], z[::every]
     order = np.argsort(x)
     ends = np.array([x.min(), x.max()])
     curves = [
-        Curve("measured", x, y, points=True),
-        Curve("before", ends, ends),
-        Curve("after", x[order], z[order], points=True),
+        PictureCurve("measured", x, y, points=True),
+        PictureCurve("before", ends, ends),
+        PictureCurve("after", x[order], z[order], points=True),
     ]
     caption = (
-        f"The {view.sensor_name} as measured against the prediction without {view.effect.name}: "
-        "were that right, the points would lie on the dashed diagonal; with the effect the "
-        f"prediction lies where the data do.{_weigh(view)}"
+        f"Measured {view.sensor_name} against the prediction without {view.effect.name}. If that "
+        "were right, the points would lie on the dashed diagonal. The prediction with the effect "
+        f"should lie on the data.{_compare_size(view)}"
     )
     return _picture(
         view,
         "line",
-        (f"{view.sensor_name} predicted without it", view.unit),
+        (f"{view.sensor_name} predicted without the effect", view.unit),
         (f"{view.sensor_name} measured", view.unit),
         curves,
         caption,
@@ -311,28 +387,29 @@ def _line(view: View) -> Picture:
 
 
 def _spectrum(view: View) -> Picture:
-    """Amplitude spectra of what the predictions leave of the sensor as it was recorded."""
+    """Amplitude spectrum of the residual of the sensor as it was recorded."""
+    # Imported here, because scipy.signal is slow to import and only a report needs it.
     from scipy.signal import welch
 
-    there = view.counts > COUNTS
-    left = (view.raw - view.after)[there]
-    length = min(len(left), max(64, round(2.0 / view.period)))
-    frequency, power = welch(left - np.mean(left), 1.0 / view.period, nperseg=length)
-    kept = frequency > 0.0
+    residual = (view.raw - view.after)[view.counted]
+    length = _segment_length(view, len(residual))
+    frequency, power = welch(residual - np.mean(residual), 1.0 / view.period, nperseg=length)
+    positive = frequency > 0.0
+    # White noise of rms σ has the one-sided density σ sqrt(2 T) at a sampling period T.
     level = math.sqrt(2.0 * view.period)
-    curves = [Curve("measured", frequency[kept], np.sqrt(power[kept]))]
-    told = _told_amplitude(view.effect)
-    if told is not None:
-        ends = np.array([frequency[kept][0], frequency[kept][-1]])
-        before, after = told
+    curves = [PictureCurve("measured", frequency[positive], np.sqrt(power[positive]))]
+    white = _white_noise(view.effect)
+    if white is not None:
+        ends = np.array([frequency[positive][0], frequency[positive][-1]])
+        before, after = white
         curves += [
-            Curve("before", ends, np.full(2, before * level)),
-            Curve("after", ends, np.full(2, after * level)),
+            PictureCurve("before", ends, np.full(2, before * level)),
+            PictureCurve("after", ends, np.full(2, after * level)),
         ]
     caption = (
-        f"Spectrum of what is left of the {view.sensor_name}: noise is its level, hum the line at "
-        "the mains frequency"
-        + ("; the level should lie on the solid line." if told is not None else ".")
+        f"Spectrum of the residual of the {view.sensor_name}. Noise is its level, and hum the line "
+        "at the mains frequency."
+        + (" The level should lie on the solid line." if white is not None else "")
     )
     return _picture(
         view=view,
@@ -345,34 +422,35 @@ def _spectrum(view: View) -> Picture:
     )
 
 
-def _told_amplitude(effect: Finding) -> tuple[float, float] | None:
-    """rms of white noise before and after, in the sensor's unit, where the effect is one."""
+def _white_noise(effect: Finding) -> tuple[float, float] | None:
+    """Rms of white noise before and after, in the sensor's unit; None for any other effect."""
     if effect.name.kind == "noise":
         (estimate,) = effect.parameters.values()
         return estimate.nominal, estimate.value
     if effect.name.kind == "quantisation":
         (estimate,) = effect.parameters.values()
+        # Rounding to steps of q is uniform noise of rms q / sqrt(12).
         return estimate.nominal / math.sqrt(12.0), estimate.value / math.sqrt(12.0)
     return None
 
 
 def _by_time(view: View) -> Picture:
-    """Measured and predicted in the second in which the prediction without it is worst."""
-    part = _stretch(view, (view.counts > COUNTS) * (view.measured - view.before) ** 2, LOOKED_AT)
+    """Signals over time in the second with the largest error without the effect."""
+    part = _stretch(view, view.counted * (view.measured - view.before) ** 2, LOOKED_AT)
     curves = [
-        Curve("measured", view.time[part], view.measured[part]),
-        Curve("before", view.time[part], view.before[part]),
-        Curve("after", view.time[part], view.after[part]),
+        PictureCurve("measured", view.time[part], view.measured[part]),
+        PictureCurve("before", view.time[part], view.before[part]),
+        PictureCurve("after", view.time[part], view.after[part]),
     ]
     caption = (
-        f"The {view.sensor_name} in the second in which the prediction without "
-        f"{view.effect.name} is furthest off: with the effect it should follow the measured "
-        f"line.{_weigh(view)}"
+        f"The {view.sensor_name} in the second with the largest error of the prediction without "
+        f"{view.effect.name}. The prediction with the effect should follow the measured "
+        f"line.{_compare_size(view)}"
     )
     if np.array_equal(view.before, view.after):
         caption = (
-            f"The {view.sensor_name} in its worst second. {view.effect.name} was read off the "
-            "commands, which the prediction follows as they were recorded: it changes no line here."
+            f"The {view.sensor_name} in the second with its largest error. {view.effect.name} was "
+            "read off the recorded commands, which the prediction follows: it changes no line here."
         )
     return _picture(view, "time", ("time", "s"), (view.sensor_name, view.unit), curves, caption)
 
@@ -388,7 +466,7 @@ FORMS: dict[str, Callable[[View], Picture]] = {
     "spectrum": _spectrum,
     "time": _by_time,
 }
-"""A form's name → what makes the picture."""
+"""Form of a picture → function that makes it."""
 
 PICTURES: dict[str, str] = {
     "coulomb": "velocity",
@@ -437,50 +515,51 @@ PICTURES: dict[str, str] = {
     "missed_ticks": "time",
     "setting": "time",
 }
-"""A kind of effect → the form of its picture; every kind has one."""
+"""Kind of effect → form of its picture. Every kind has one."""
 
 
 def without_effect(nominal: Plant, corrected: Plant, effect: Finding) -> Plant:
-    """The corrected plant with one effect's parameters as they were.
+    """Return the corrected plant with the parameters of one effect at their nominal values.
 
     Parameters
     ----------
     nominal, corrected
-        Before and after the diagnosis.
+        Plants before and after the correction.
     effect
-        That is taken out; one that is no parameter of the plant changes nothing.
+        Effect that is removed. One that is no parameter of the plant changes nothing.
 
     Returns
     -------
     Plant
-        With everything else that was found.
+        Plant with all other corrections.
     """
     group = GROUPS.get(effect.name.component, effect.name.component)
-    own = getattr(nominal, group, None)
-    fields: tuple[str, ...] = getattr(own, "_fields", ())
-    back = {name: float(getattr(own, name)) for name in effect.parameters if name in fields}
-    return with_parameters(corrected, group, back) if back else corrected
+    component = getattr(nominal, group, None)
+    fields: tuple[str, ...] = getattr(component, "_fields", ())
+    values = {name: float(getattr(component, name)) for name in effect.parameters if name in fields}
+    return with_parameters(corrected, group, values) if values else corrected
 
 
 def picture(evidence: Evidence, corrected: Plant, effect: Finding) -> Picture:
-    """The picture of one effect, of the recording and sensor that it explains most of.
+    """Return the picture of one effect, in the recording and sensor where it explains most.
 
     Parameters
     ----------
     evidence
         Recordings to show it in.
     corrected
-        The plant with all that was found.
+        Plant with all corrections.
     effect
-        The finding.
+        Effect to be shown.
 
     Returns
     -------
     Picture
-        Numbers only.
+        Numbers only; `figures` draws them.
     """
-    less = without_effect(evidence.plant, corrected, effect)
-    before, after = evidence.predict(less), evidence.predict(corrected)
+    reduced = without_effect(evidence.plant, corrected, effect)
+    before, after = evidence.predict(reduced), evidence.predict(corrected)
+    # Decrease of χ² by the effect, for each sensor of each recording.
     gains = [
         np.sum(lines.fade * ((lines.measured - b) ** 2 - (lines.measured - a) ** 2), axis=1)
         / (lines.noise**2)
@@ -488,7 +567,7 @@ def picture(evidence: Evidence, corrected: Plant, effect: Finding) -> Picture:
     ]
     names = evidence.names
     if effect.name.component in names and PICTURES[effect.name.kind] == "spectrum":
-        # Noise is its own sensor's, and no prediction tells.
+        # Noise changes no prediction, so its sensor is known but no recording explains most.
         number, row = 0, names.index(effect.name.component)
     else:
         number = int(np.argmax([np.max(gain) for gain in gains]))
@@ -503,11 +582,9 @@ def _view(
     lines, recording = evidence.lines[number], evidence.recordings[number]
     model: Any = evidence.models[number]
     meaning = evidence.machine.rows[row]
-    component = evidence.machine.components.get(effect.name.component)
-    turning = {replay.joint.name for replay in evidence.machine.replays if replay.joint.turns}
-    angular = component is not None and (component.turns or component.joint in turning)
     ticks = lines.measured.shape[1]
     measured = lines.measured[row]
+    # The model may take every n-th tick only.
     raw = recording.column(*meaning.channel)[:: model.every]
     return View(
         effect=effect,
@@ -515,7 +592,7 @@ def _view(
         sensor=meaning.name,
         kind=meaning.kind,
         unit=meaning.unit,
-        angular=angular,
+        angular=is_angular(evidence.machine, effect.name.component),
         time=recording.time[0] + lines.period * np.arange(ticks),
         raw=raw[:ticks],
         measured=measured,

@@ -1,5 +1,4 @@
-"""The diagnosis as one HTML file to look at: no network, readable on a telephone and on paper; and
-as a browser prints it."""
+"""Report of a diagnosis: one HTML file that needs no network, or its print as PDF or PNG."""
 
 from __future__ import annotations
 
@@ -19,8 +18,8 @@ from rigtwin.diagnosis.advice import advise
 from rigtwin.diagnosis.explain import candidates
 from rigtwin.diagnosis.finding import Answer, Finding
 from rigtwin.diagnosis.overlay import Overlay
-from rigtwin.diagnosis.text import against_nominal, largest_left
-from rigtwin.diagnosis.units import say, spell
+from rigtwin.diagnosis.text import against_nominal
+from rigtwin.diagnosis.units import find_unit, shorten, spell
 from rigtwin.diagnosis.units import write as write_size
 from rigtwin.diagnosis.words import name_part
 from rigtwin.files import atomic_write
@@ -31,12 +30,22 @@ if TYPE_CHECKING:
 
 
 WRITERS = {".pdf": write_pdf, ".png": write_png}
-"""By the ending of the file's name; HTML otherwise."""
+"""Ending of a file's name → function that writes it. Every other ending is HTML."""
 
 
 @dataclass(frozen=True)
 class Bar:
-    """A gap before and after in noise floors, and the widths of its bars in percent."""
+    """Bar of the gap chart.
+
+    Attributes
+    ----------
+    name
+        Component, or "all sensors".
+    before, after
+        Gap before and after the correction, in noise floors.
+    before_width, after_width, floor_width
+        Widths of the bars and position of the noise floor, in percent of the chart.
+    """
 
     name: str
     before: float
@@ -47,7 +56,19 @@ class Bar:
 
 
 def bars(answer: Answer) -> list[Bar]:
-    """All sensors together, then each component's replay; widths on a scale common to all."""
+    """Return the bars of the gap chart on one scale.
+
+    Parameters
+    ----------
+    answer
+        Answer of a diagnosis.
+
+    Returns
+    -------
+    list of Bar
+        All sensors first, then each component's replay. With a single replay, that one alone, as it
+        says the same. Empty where the data cannot be diagnosed.
+    """
     if answer.gap is None:
         return []
     gap = answer.gap
@@ -65,140 +86,179 @@ def bars(answer: Answer) -> list[Bar]:
 
 
 WORSE = 1.5
-"""Times a sensor's typical error of the recordings from which the worst of them is told at the
-top,"""
+"""Ratio of a recording's error to the sensor's median error from which the report warns of it."""
 TOLERABLE = 10.0
-"""if it is more than so many percent of the signal."""
-NEXT_TO_NOTHING = 0.02
-"""Share of the signals' swing below which a twin predicts nothing."""
-CONFIDENCE = "the probability that it is this effect, among all hypotheses that were tried"
+"""Error, in percent of the signal, below which the report warns of no recording."""
+NEGLIGIBLE = 0.02
+"""Share of a signal's standard deviation below which a twin predicts nothing of it."""
+CONFIDENCE = "the probability that this effect is present, among all hypotheses that were tried"
 
 
 def headlines(overlays: Sequence[Overlay], corrected: bool) -> list[str]:
-    """How good the twin is before and after in percent of the signals, and where it is not.
+    """Return how good the twin is before and after the correction, and where it is not good.
 
     Parameters
     ----------
     overlays
-        Of a diagnosis.
+        Overlays of all recordings and sensors.
     corrected
-        Whether anything was found.
+        Whether an effect was named, so that there is a corrected twin.
 
     Returns
     -------
     list of str
-        Sentences.
+        Sentences for the top of the report.
     """
     if not overlays:
         return []
-    said = []
-    if all(float(np.std(each.nominal)) < NEXT_TO_NOTHING * each.swing for each in overlays):
-        said.append(
-            "The nominal twin predicts next to nothing of these signals: what was found identifies "
-            "the machine, rather than correcting a model of it."
+    sentences = []
+    if all(float(np.std(each.nominal)) < NEGLIGIBLE * each.swing for each in overlays):
+        sentences.append(
+            "The nominal twin predicts almost nothing of these signals: the named effects identify "
+            "the machine rather than correct a model of it."
         )
     if not corrected:
-        return said
-    held = [each for each in overlays if each.held_out]
-    counted = held or list(overlays)
+        return sentences
+    held_out = [each for each in overlays if each.held_out]
+    # The error on the data of the fit is optimistic, so held-out recordings count alone.
+    counted = held_out or list(overlays)
     after = [each.after_percent for each in counted]
     before = [each.before_percent for each in counted]
-    data = "recordings that were not fitted" if held else "the recordings"
-    said.append(
-        f"Rms of measured less predicted on {data}, in percent of the signal's standard "
+    data = "recordings that were not fitted" if held_out else "the recordings"
+    sentences.append(
+        f"Rms of measured minus predicted on {data}, in percent of the signal's standard "
         f"deviation: {_between(before)} before, {_between(after)} after."
     )
     beyond = [_beyond_noise(each) for each in counted]
     worst = int(np.argmax(beyond))
-    alike = [
-        b for each, b in zip(counted, beyond, strict=True) if each.sensor == counted[worst].sensor
+    same_sensor = [
+        error
+        for each, error in zip(counted, beyond, strict=True)
+        if each.sensor == counted[worst].sensor
     ]
-    if beyond[worst] > max(WORSE * float(np.median(alike)), TOLERABLE):
-        said.append(
-            f"In {counted[worst].recording} {spell(after[worst], 3)} % is left of the "
-            f"{counted[worst].sensor.replace('_', ' ')}: do not rely on the corrected twin in such "
-            "tests."
+    if beyond[worst] > max(WORSE * float(np.median(same_sensor)), TOLERABLE):
+        sentences.append(
+            f"In {counted[worst].recording} the residual of the "
+            f"{name_part(counted[worst].sensor)} is {spell(after[worst], 3)} % of the signal: do "
+            "not rely on the corrected twin in such tests."
         )
-    return said
+    return sentences
 
 
 def _beyond_noise(overlay: Overlay) -> float:
-    """What is left of a sensor, its noise taken off, in percent of its standard deviation."""
+    """Rms residual beyond the sensor's noise, in percent of the signal's standard deviation."""
     return 100.0 * math.sqrt(max(overlay.after**2 - overlay.noise**2, 0.0)) / overlay.swing
 
 
 def _between(values: Sequence[float]) -> str:
-    """The least and the greatest of some figures."""
+    """Write the range of some percentages."""
     low, high = (spell(end, 3) for end in (min(values), max(values)))
     return f"{low} %" if low == high else f"{low} to {high} %"
 
 
 def html(diagnosis: Diagnosis) -> str:
-    """The page."""
-    environment = Environment(
-        loader=PackageLoader("rigtwin.diagnosis"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters["code"] = _code
-    # Bokeh is slow to import, and a diagnosis without a report does without it.
+    """Return the HTML page of a diagnosis.
+
+    Parameters
+    ----------
+    diagnosis
+        Diagnosis of any verdict.
+
+    Returns
+    -------
+    str
+        Page with styles, scripts and data inside.
+    """
+    # Bokeh takes a second to import, and a diagnosis without a report does not need it.
     from rigtwin.diagnosis import figures
 
     answer = diagnosis.answer
     overlays = diagnosis.overlays()
     corrected = bool(answer.effects)
     drawings = figures.draw(diagnosis.pictures(), overlays, corrected)
+    # The drawing of the machine marks the components of effects and of located residuals.
     guilty = {effect.name.component for effect in answer.effects} | {
         place.component for place in answer.where
     }
-    return environment.get_template("report.html").render(
-        diagnosis=answer,
-        guilty=guilty,
-        bars=bars(answer),
-        drawings=drawings,
-        overlays=overlays,
-        corrected=corrected,
-        advice=advise(answer),
-        title_of=title_of,
-        meaning_of=meaning_of,
-        share_of=share_of,
-        headlines=headlines(overlays, corrected),
-        tested=list(dict.fromkeys(each.recording for each in overlays if each.held_out)),
-        confidence=CONFIDENCE,
-        weight="weight among those tried",
-        spell=spell,
-        say=say,
-        against_nominal=against_nominal,
-        write=write_size,
-        largest={
-            unit: max(max(each.before, each.noise) for each in overlays if each.unit == unit)
-            for unit in {each.unit for each in overlays}
-        },
-        largest_left=largest_left(answer),
-        recordings=[Path(each).name for each in answer.recordings],
-        title=diagnosis.described.title,
-        components=list(diagnosis.evidence.machine.components)
-        if diagnosis.evidence is not None
-        else [],
-        tried=len(candidates(diagnosis.evidence)) if diagnosis.evidence is not None else 0,
-        version=__version__,
+    return (
+        _environment()
+        .get_template("report.html")
+        .render(
+            diagnosis=answer,
+            guilty=guilty,
+            bars=bars(answer),
+            drawings=drawings,
+            overlays=overlays,
+            corrected=corrected,
+            advice=advise(answer),
+            title_of=title_of,
+            meaning_of=meaning_of,
+            share_of=share_of,
+            headlines=headlines(overlays, corrected),
+            tested=list(dict.fromkeys(each.recording for each in overlays if each.held_out)),
+            confidence=CONFIDENCE,
+            weight="weight among those tried",
+            spell=spell,
+            sensor_units=_sensor_units(overlays),
+            step_units=_step_units(answer),
+            against_nominal=against_nominal,
+            write=write_size,
+            recordings=[Path(name).name for name in answer.recordings],
+            title=diagnosis.described.title,
+            components=list(diagnosis.evidence.machine.components)
+            if diagnosis.evidence is not None
+            else [],
+            tried=len(candidates(diagnosis.evidence)) if diagnosis.evidence is not None else 0,
+            version=__version__,
+        )
     )
 
 
+def _environment() -> Environment:
+    """Environment of the template; a misspelt variable raises rather than leaving a gap."""
+    environment = Environment(
+        loader=PackageLoader("rigtwin.diagnosis"),
+        # Names of files and channels come from outside and could otherwise write HTML.
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters["code"] = _code
+    return environment
+
+
+def _step_units(answer: Answer) -> dict[str, tuple[float, str]]:
+    """Factor from SI and unit of each signal's residual, the same in all steps."""
+    return {
+        name: shorten(unit, *(step.residual[name] for step in answer.steps))
+        for name, unit in answer.units.items()
+    }
+
+
+def _sensor_units(overlays: Sequence[Overlay]) -> dict[str, tuple[float, str]]:
+    """Factor from SI and unit of each sensor's errors, the same in every row of a table."""
+    largest: dict[str, float] = {}
+    for row in overlays:
+        largest[row.sensor] = max(largest.get(row.sensor, 0.0), row.before, row.after)
+    return {row.sensor: find_unit(row.unit, largest[row.sensor]) for row in overlays}
+
+
 def title_of(effect: Finding) -> str:
-    """An effect in words, with its component."""
+    """Return an effect and its component in words, as a title."""
     return f"{effect.title[0].upper()}{effect.title[1:]}, {name_part(effect.name.component)}"
 
 
 def share_of(effect: Finding) -> str:
-    """An effect's share of the gap in percent."""
+    """Return an effect's share of the gap in percent."""
     return "under 1 %" if 0.0 < effect.share < 0.01 else f"{100.0 * effect.share:.0f} %"
 
 
 def meaning_of(effect: Finding) -> str:
-    """What an effect does, in words; by its sign, where that makes a difference."""
+    """Return what an effect does, in words.
+
+    Some kinds mean something else for a negative value: a negative lag leads.
+    """
     kind = next((each for each in KINDS if each.name == effect.name.kind), None)
     if kind is None:
         return ""
@@ -208,7 +268,7 @@ def meaning_of(effect: Finding) -> str:
 
 
 def _code(text: str) -> Markup:
-    """Marks what stands between backquotes."""
+    """Mark the text between backquotes as code, and escape the rest."""
     return Markup("").join(
         Markup("<code>{}</code>").format(part) if number % 2 else escape(part)
         for number, part in enumerate(text.split("`"))
@@ -216,6 +276,24 @@ def _code(text: str) -> Markup:
 
 
 def write(path: Path, diagnosis: Diagnosis) -> Path:
-    """Writes the page. Raises RigtwinError if it cannot."""
+    """Write the report.
+
+    Parameters
+    ----------
+    path
+        File to be written; its ending chooses HTML, PDF or PNG.
+    diagnosis
+        Diagnosis of any verdict.
+
+    Returns
+    -------
+    Path
+        The path.
+
+    Raises
+    ------
+    RigtwinError
+        If the file cannot be written, or no browser is installed to print it.
+    """
     WRITERS.get(path.suffix.lower(), atomic_write)(path, html(diagnosis))
     return path

@@ -1,4 +1,4 @@
-"""A diagnosis: the answer, what pictures of it are drawn from, and the corrected twin."""
+"""Result of a diagnosis: the answer, the evidence that its pictures are drawn from, the twin."""
 
 from __future__ import annotations
 
@@ -24,11 +24,22 @@ from rigtwin.files import forbid_overwriting
 class Diagnosis:
     """Why recordings of a machine and its twin disagree.
 
-    answer: all that is said; described: the machine as described; evidence: None where the data
-    cannot be diagnosed; corrected: the twin of the first recording with what was found; otherwise:
-    other explanations that are not out of the question, with their probability; held_out: the
-    recordings that the correction was judged on, None without any. In a notebook it shows its
-    report.
+    A notebook shows the report.
+
+    Attributes
+    ----------
+    answer
+        Verdict, findings and figures.
+    described
+        Machine as described.
+    evidence
+        Recordings that were fitted. None where they cannot be diagnosed.
+    corrected
+        Settings of the first recording with the corrected plant.
+    otherwise
+        Other explanations that remain possible, with their probability, the likeliest first.
+    held_out
+        Recordings that judged the correction. None without any.
     """
 
     answer: Answer
@@ -40,108 +51,133 @@ class Diagnosis:
 
     @property
     def verdict(self) -> Verdict:
-        """no gap, explained, partly explained, unknown or unusable."""
+        """Verdict: no gap, explained, partly explained, unknown or unusable."""
         return self.answer.verdict
 
     @property
     def sentence(self) -> str:
-        """The answer in a sentence."""
+        """Answer on one line."""
         return self.answer.sentence
 
     @property
     def effects(self) -> tuple[Finding, ...]:
-        """The effects that are named, with magnitude, interval, confidence and class."""
+        """Named effects, with values, intervals, confidence and rivals."""
         return self.answer.effects
 
     @property
     def where(self) -> tuple[Place, ...]:
-        """Where the gap lies."""
+        """Locations of the gap, the largest share first."""
         return self.answer.where
 
     @property
     def gap(self) -> Gap | None:
-        """The gap before and after the correction; None where the data cannot be diagnosed."""
+        """Gap before and after the correction. None where the data cannot be diagnosed."""
         return self.answer.gap
 
     @property
     def machine(self) -> Machine:
-        """The corrected machine: the described one with what was found of plant, sensors and
-        computer."""
+        """Described machine with the corrected values of plant, sensors and computer."""
         plant = self.corrected.plant
         for effect in self.effects:
             group = GROUPS.get(effect.name.component, "")
             if group and all(name in getattr(plant, group)._fields for name in effect.parameters):
-                # What the computer does late or not at all belongs to the twin as the plant's
-                # defects do.
-                plant = with_parameters(
-                    plant, group, {name: each.value for name, each in effect.parameters.items()}
-                )
+                # Delays and missed ticks of the computer are read off the controller's commands, so
+                # `corrected` lacks them; the twin needs them as much as the plant's defects.
+                values = {name: estimate.value for name, estimate in effect.parameters.items()}
+                plant = with_parameters(plant, group, values)
         return replace(self.described, plant=plant)
 
     @property
     def _inputs(self) -> tuple[Path, ...]:
-        """The files that it was made of."""
-        recordings = [Path(each) for each in self.answer.recordings]
+        """Files that the diagnosis was made of; none of its outputs may overwrite them."""
+        recordings = [Path(name) for name in self.answer.recordings]
         if self.held_out is not None:
-            recordings += [each.path for each in self.held_out.recordings]
+            recordings += [recording.path for recording in self.held_out.recordings]
         return (*recordings, *self.described.files)
 
     def document(self) -> dict[str, Any]:
-        """The answer as JSON has it."""
+        """Return the answer as the JSON document that keeps to `answer.schema.json`."""
         return self.answer.document()
 
     def overlays(self) -> tuple[Overlay, ...]:
-        """Every observed sensor as measured, as nominal and as corrected, held-out recordings
-        first; empty where the data cannot be diagnosed."""
+        """Return every observed sensor as measured, nominal and corrected.
+
+        Returns
+        -------
+        tuple of Overlay
+            Held-out recordings first. Empty where the data cannot be diagnosed.
+        """
         if self.evidence is None:
             return ()
         return overlay(self.evidence, self.corrected.plant, self.held_out)
 
     def pictures(self) -> tuple[Picture, ...]:
-        """For each effect that is named, the numbers of the picture that shows it in the data, in
-        held-out recordings if there are any."""
+        """Return the picture that shows each named effect in the data.
+
+        Returns
+        -------
+        tuple of Picture
+            One picture per effect, of held-out recordings if there are any. Empty where the data
+            cannot be diagnosed.
+        """
         shown = self.held_out or self.evidence
         if shown is None:
             return ()
         return tuple(picture(shown, self.corrected.plant, effect) for effect in self.effects)
 
     def report(self, path: str | Path) -> Path:
-        """Writes the report, one file.
+        """Write the report to one file.
 
         Parameters
         ----------
         path
-            PDF or PNG if its name ends so, printed by Chrome, Chromium or Edge; HTML otherwise.
+            File to be written. A name that ends in .pdf or .png is printed by Chrome, Chromium or
+            Edge; every other one is HTML.
 
         Returns
         -------
         Path
-            The same.
+            The path.
 
         Raises
         ------
         RigtwinError
-            If it cannot be written, or no browser is there to print it.
+            If the file cannot be written, or no browser is installed to print it.
         """
         return report.write(forbid_overwriting(path, *self._inputs), self)
 
     def save_twin(self, path: str | Path) -> Path:
-        """Writes the corrected twin as TOML, for `--config`. Raises RigtwinError if it cannot be
-        written, or if the data were not fit for a diagnosis."""
-        return calibrated.save(forbid_overwriting(path, *self._inputs), self)
-
-    def save_mjcf(self, path: str | Path) -> tuple[str, ...]:
-        """Writes the machine's own MJCF with the corrected values and nothing else changed.
+        """Write the corrected twin as TOML, for `--config`.
 
         Parameters
         ----------
         path
-            Of the new file. Meshes and included files are looked for beside it.
+            File to be written.
+
+        Returns
+        -------
+        Path
+            The path.
+
+        Raises
+        ------
+        RigtwinError
+            If the recordings could not be diagnosed, or the file cannot be written.
+        """
+        return calibrated.save(forbid_overwriting(path, *self._inputs), self)
+
+    def save_mjcf(self, path: str | Path) -> tuple[str, ...]:
+        """Write the machine's MJCF with the corrected values and nothing else changed.
+
+        Parameters
+        ----------
+        path
+            File to be written. MuJoCo looks for meshes and included files beside it.
 
         Returns
         -------
         tuple of str
-            The corrections that MJCF has no attribute for, such as a lag or a play, a line each.
+            Corrections that MJCF has no attribute for, such as a lag or a play, one line each.
 
         Raises
         ------
@@ -149,9 +185,9 @@ class Diagnosis:
             If the model is a URDF, or the file cannot be written.
         """
         changes = [
-            Change(effect.name.component, name, each.value)
+            Change(effect.name.component, name, estimate.value)
             for effect in self.effects
-            for name, each in effect.parameters.items()
+            for name, estimate in effect.parameters.items()
         ]
         return write_mjcf(forbid_overwriting(path, *self._inputs), self.described, changes)
 

@@ -2,183 +2,233 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from rigtwin.diagnosis.advice import advise
 from rigtwin.diagnosis.finding import Answer, Estimate, Finding, Gap, Place, Verdict
 from rigtwin.diagnosis.units import shorten, spell, write
-from rigtwin.diagnosis.words import enumerate_words, name_part
+from rigtwin.diagnosis.words import enumerate_words, indefinite_article, name_part
 
-UNMOVING = ("noise", "hum", "quantisation", "setting", "missed_ticks")
-"""Kinds that are read off signals or commands, and change no replay."""
-MOST_TOLD = 5
-"""Effects in one sentence."""
+STATIC = ("noise", "hum", "quantisation", "setting", "missed_ticks")
+"""Kinds that are read off signals or commands; correcting them changes no prediction."""
+MOST_EFFECTS = 5
+"""Effects that one sentence lists at most."""
+UNBOUNDED = 1e9
+"""Nominal values from this magnitude on mean that the twin has no such limit."""
+GAP_TO_CLOSE = 1.05
+"""Gap, in noise floors, from which the closed share of it is worth a sentence."""
+INTERVAL_NOTE = (
+    "intervals: 2.5 standard errors to either side; "
+    "docs/confidence.md says how often they hold the true value"
+)
 
 
-def tell_apart(one: float, other: float) -> tuple[str, str]:
-    """Two numbers with four digits, or with as many more as it takes to tell them apart."""
+def format_distinct(first: float, second: float) -> tuple[str, str]:
+    """Write two numbers to four digits, or to as many more as make the texts differ."""
     texts = "", ""
     for digits in range(4, 17):
-        texts = f"{one:.{digits}g}", f"{other:.{digits}g}"
+        texts = f"{first:.{digits}g}", f"{second:.{digits}g}"
         if texts[0] != texts[1]:
             break
     return texts
 
 
-def number(estimate: Estimate) -> str:
-    """A parameter's value with its interval."""
+def format_estimate(estimate: Estimate) -> str:
+    """Write a parameter's value with its interval and its nominal value, all in one unit."""
     value, nominal, factor, unit = against_nominal(estimate)
     low, high = (spell(factor * end, 4) for end in (estimate.low, estimate.high))
-    return f"{value}{unit} (95 %: {low} to {high}), nominal {nominal}"
+    return f"{value}{unit} (interval {low} to {high}), nominal {nominal}"
 
 
 def against_nominal(estimate: Estimate) -> tuple[str, str, float, str]:
-    """A parameter's value and its nominal one in the same unit, what values in SI are multiplied by
-    for that, and the unit after its space."""
-    none = abs(estimate.nominal) >= 1e9
-    factor, unit = shorten(estimate.unit, estimate.value, 0.0 if none else estimate.nominal)
-    value, nominal = tell_apart(factor * estimate.value, factor * estimate.nominal)
-    return value, "none" if none else nominal, factor, f" {unit}" if unit else ""
+    """Write a parameter's value and its nominal value in one unit.
+
+    Parameters
+    ----------
+    estimate
+        Value and nominal value, SI.
+
+    Returns
+    -------
+    tuple
+        Text of the value, text of the nominal value ("none" for a limit that the twin lacks),
+        factor from SI to the unit, and the unit with a space before it.
+    """
+    unlimited = abs(estimate.nominal) >= UNBOUNDED
+    factor, unit = shorten(estimate.unit, estimate.value, 0.0 if unlimited else estimate.nominal)
+    value, nominal = format_distinct(factor * estimate.value, factor * estimate.nominal)
+    return value, "none" if unlimited else nominal, factor, f" {unit}" if unit else ""
 
 
 def describe(diagnosis: Answer) -> str:
-    """The answer, what it rests on, and what to do next."""
-    lines = [f"{diagnosis.verdict}: {diagnosis.sentence}"]
-    for fault in diagnosis.faults:
-        lines.append(f"  fault: {fault}")
-    for effect in diagnosis.effects:
-        sure, share = 100 * effect.confidence, 100 * effect.share
-        lines.append(f"  {effect.name}, confidence {sure:.0f} %, share of the gap {share:.0f} %")
-        for name, estimate in effect.parameters.items():
-            lines.append(f"    {name} = {number(estimate)}")
-        if effect.rivals:
-            lines.append(f"    these data cannot tell it from {_list_rivals(effect)}")
-    if (nearest := diagnosis.nearest) is not None:
-        names = " + ".join(str(name) for name in nearest.names)
-        left = f"{100 * nearest.left:.2g} % of the signals, {100 * nearest.without:.2g} without"
-        lines.append(f"  nearest: {names}, not enough to be named; it leaves {left}")
-    for effect in diagnosis.traces:
-        values = ", ".join(
-            f"{name} {write(estimate.value, estimate.unit)}"
-            for name, estimate in effect.parameters.items()
-        )
-        lines.append(
-            f"  trace: {effect.name} ({values}) would close {100 * effect.share:.2g} "
-            "% of what is left: too little to be claimed"
-        )
-    if diagnosis.steps:
-        lines.append("  what is left, rms, as effects are found one after another:")
-        largest = largest_left(diagnosis)
-        for step in diagnosis.steps:
-            amounts = ", ".join(
-                f"{name} {write(value, diagnosis.units[name], largest[name])}"
-                for name, value in step.left.items()
-            )
-            values = ", ".join(
-                f"{name} {write(each.value, each.unit)}" for name, each in step.values.items()
-            )
-            lines.append(f"    {step.added}{f' ({values})' if values else ''}: {amounts}")
-    for place in diagnosis.where:
-        low, high = place.band_hz
-        lines.append(
-            f"  where: {place.component}, {place.region}, {low:.3g} "
-            f"to {high:.3g} Hz; {place.evidence}"
-        )
-    if (gap := diagnosis.gap) is not None:
-        lines.append(
-            f"  gap of all sensors: {gap.before:.3g} noise floors "
-            f"before, {gap.after:.3g} after; 1 is noise alone"
-        )
-        if diagnosis.effects and gap.before > 1.05:
-            held = gap.shrinkage_held_out
-            lines.append(
-                f"  closes {100 * held.value:.1f} % ({100 * held.low:.1f} "
-                f"to {100 * held.high:.1f}) on {gap.held_out}; "
-                f"predicted {100 * gap.shrinkage_predicted:.1f} %"
-            )
-    for place in diagnosis.leftovers:
-        low, high = place.band_hz
-        lines.append(
-            f"  left over: {place.component}, {place.region}, "
-            f"{low:.3g} to {high:.3g} Hz; {place.evidence}"
-        )
-    lines += [f"  next: {each.replace('`', '')}" for each in advise(diagnosis)]
+    """Write the answer, the evidence for it and the next step, for a terminal."""
+    lines = [
+        f"{diagnosis.verdict}: {diagnosis.sentence}",
+        *(f"  fault: {fault}" for fault in diagnosis.faults),
+        *_effect_lines(diagnosis),
+        *_step_lines(diagnosis),
+        *(f"  where: {_describe_place(place)}" for place in diagnosis.where),
+        *_gap_lines(diagnosis),
+        *(f"  residual: {_describe_place(place)}" for place in diagnosis.leftovers),
+        *(f"  next: {step.replace('`', '')}" for step in advise(diagnosis)),
+    ]
     if diagnosis.not_observable:
         names = ", ".join(f"{each.kind}@{each.component}" for each in diagnosis.not_observable)
-        lines.append(f"  could not be seen with these data: {names}")
-    lines += [f"  energy error of {name}: {each}" for name, each in diagnosis.energy.items()]
+        lines.append(f"  not observable with these data: {names}")
+    lines += [f"  energy error of {name}: {error}" for name, error in diagnosis.energy.items()]
     lines += [f"  note: {note}" for note in diagnosis.notes]
+    if diagnosis.effects:
+        lines.append(f"  {INTERVAL_NOTE}")
     lines.append(f"  {diagnosis.seconds:.1f} s")
     return "\n".join(lines)
 
 
-def largest_left(diagnosis: Answer) -> dict[str, float]:
-    """Signal → greatest rms that any step leaves of it, by which all steps are written in one
-    unit."""
-    names = {name for step in diagnosis.steps for name in step.left}
-    return {
-        name: max(step.left[name] for step in diagnosis.steps if name in step.left)
-        for name in names
+def _effect_lines(diagnosis: Answer) -> Iterator[str]:
+    """Named effects, then the nearest explanation and the traces, which are not named."""
+    for effect in diagnosis.effects:
+        confidence, share = 100 * effect.confidence, 100 * effect.share
+        yield f"  {effect.name}, confidence {confidence:.0f} %, share of the gap {share:.0f} %"
+        for name, estimate in effect.parameters.items():
+            yield f"    {name} = {format_estimate(estimate)}"
+        if effect.rivals:
+            yield f"    these data cannot distinguish it from {_list_rivals(effect)}"
+    if (nearest := diagnosis.nearest) is not None:
+        names = " + ".join(str(name) for name in nearest.names)
+        yield (
+            f"  nearest explanation, not good enough to be named: {names}; it leaves a residual "
+            f"of {100 * nearest.residual:.2g} % of the signals' standard deviation, "
+            f"the nominal twin {100 * nearest.without:.2g} %"
+        )
+    for effect in diagnosis.traces:
+        yield (
+            f"  trace, too small to be named: {effect.name} ({_list_values(effect.parameters)}) "
+            f"would close another {100 * effect.share:.2g} % of the gap"
+        )
+
+
+def _step_lines(diagnosis: Answer) -> Iterator[str]:
+    """Table of residuals; a signal has the same unit in every row."""
+    if not diagnosis.steps:
+        return
+    yield "  rms residual as effects are added one after another:"
+    units = {
+        name: shorten(unit, *(step.residual[name] for step in diagnosis.steps))
+        for name, unit in diagnosis.units.items()
     }
+    for step in diagnosis.steps:
+        amounts = ", ".join(
+            f"{name} {spell(units[name][0] * value, 4)} {units[name][1]}".rstrip()
+            for name, value in step.residual.items()
+        )
+        values = f" ({_list_values(step.values)})" if step.values else ""
+        yield f"    {step.added}{values}: {amounts}"
+
+
+def _gap_lines(diagnosis: Answer) -> Iterator[str]:
+    gap = diagnosis.gap
+    if gap is None:
+        return
+    yield (
+        f"  gap of all sensors: {gap.before:.3g} noise floors before, {gap.after:.3g} after "
+        "the correction; 1 is noise alone"
+    )
+    if diagnosis.effects and gap.before > GAP_TO_CLOSE:
+        closed = gap.shrinkage_held_out
+        yield (
+            f"  the correction closes {100 * closed.value:.1f} % of the gap "
+            f"({100 * closed.low:.1f} to {100 * closed.high:.1f} %) on {gap.held_out}, "
+            f"and {100 * gap.shrinkage_predicted:.1f} % on the data of the fit"
+        )
+
+
+def _describe_place(place: Place) -> str:
+    low, high = place.band_hz
+    return f"{place.component}, {place.region}, {low:.3g} to {high:.3g} Hz; {place.evidence}"
+
+
+def _list_values(parameters: dict[str, Estimate]) -> str:
+    return ", ".join(
+        f"{name} {write(estimate.value, estimate.unit)}" for name, estimate in parameters.items()
+    )
 
 
 def _list_rivals(effect: Finding) -> str:
-    """The effects that the data cannot tell from one, with the values that they would have."""
-    rivals = []
-    for rival in effect.rivals:
-        values = ", ".join(
-            f"{name} {write(each.value, each.unit)}" for name, each in rival.parameters.items()
-        )
-        rivals.append(f"{rival.name} ({values})" if values else str(rival.name))
-    return enumerate_words(rivals)
+    """List the rivals of an effect, with the values that they would have."""
+    return enumerate_words(
+        [
+            f"{rival.name} ({_list_values(rival.parameters)})"
+            if rival.parameters
+            else str(rival.name)
+            for rival in effect.rivals
+        ]
+    )
 
 
 def sentence(verdict: Verdict, effects: Sequence[Finding], where: Sequence[Place], gap: Gap) -> str:
-    """The answer in one sentence."""
+    """Write the answer in one sentence.
+
+    Parameters
+    ----------
+    verdict
+        Verdict of the diagnosis.
+    effects
+        Effects that are named.
+    where
+        Locations of the gap, the largest first.
+    gap
+        Gap before and after the correction.
+
+    Returns
+    -------
+    str
+        One line that begins with a capital and ends with a full stop.
+    """
     if verdict == "no gap":
         return (
-            "No gap: the twin predicts this rig to within its "
+            "No gap: the twin predicts this machine to within its "
             "sensors' noise and declared tolerances."
         )
     if verdict == "unknown":
         place = where[0] if where else None
         at = f" at the {name_part(place.component)}; {place.evidence}" if place else ""
-        return f"Something that this library has no name for acts{at}."
+        return f"Unmodelled effect{at}."
     shown = list(effects)
     more = ""
-    if len(effects) > MOST_TOLD:
-        shown = sorted(effects, key=lambda effect: -effect.share)[:MOST_TOLD]
-        more = f"; and {len(effects) - MOST_TOLD} more effects that are smaller"
+    if len(effects) > MOST_EFFECTS:
+        shown = sorted(effects, key=lambda effect: -effect.share)[:MOST_EFFECTS]
+        more = f"; and {len(effects) - MOST_EFFECTS} more effects that are smaller"
     parts: dict[str, list[str]] = {}
     for effect in shown:
-        parts.setdefault(effect.name.component, []).append(_tell(effect))
-    said = "; ".join(
-        f"{_with_article(component)} has {enumerate_words(told)}"
-        for component, told in parts.items()
+        parts.setdefault(effect.name.component, []).append(_describe_effect(effect))
+    listed = "; ".join(
+        f"{_with_article(component)} has {enumerate_words(descriptions)}"
+        for component, descriptions in parts.items()
     )
-    closes = (
-        f"; correcting that closes {100 * gap.shrinkage_held_out.value:.0f} "
-        "% of the gap on data held out of the fit"
-    )
-    moves = any(effect.name.kind not in UNMOVING for effect in effects)
-    closed = closes if gap.before > 1.05 and moves else ""
-    left = "; something that has no name here is left" if verdict == "partly explained" else ""
-    text = said + more + closed + left + "."
+    closed = ""
+    if gap.before > GAP_TO_CLOSE and any(effect.name.kind not in STATIC for effect in effects):
+        closed = (
+            f"; the correction closes {100 * gap.shrinkage_held_out.value:.0f} "
+            "% of the gap on data held out of the fit"
+        )
+    residual = "; an unmodelled residual remains" if verdict == "partly explained" else ""
+    text = listed + more + closed + residual + "."
     return text[0].upper() + text[1:]
 
 
 def _with_article(component: str) -> str:
-    """joint 2, but the motor."""
+    """Return "joint 2" as it is, and "the motor" with its article."""
     name = name_part(component)
     return name if name[-1].isdigit() else f"the {name}"
 
 
-def _tell(effect: Finding) -> str:
-    """An effect with its value."""
+def _describe_effect(effect: Finding) -> str:
+    """Describe an effect by its first parameter, its nominal value and its confidence."""
     name, estimate = next(iter(effect.parameters.items()))
     value, nominal, _, unit = against_nominal(estimate)
-    was = nominal if nominal == "none" else f"{nominal}{unit}"
+    reference = nominal if nominal == "none" else f"{nominal}{unit}"
     title = f"setting {name}" if effect.name.kind == "setting" else effect.title
-    article = "an" if title[0] in "aeiou" else "a"
     likely = f"{100 * effect.confidence:.0f} %"
-    return f"{article} {title} of {value}{unit} instead of {was} (confidence {likely})"
+    return (
+        f"{indefinite_article(title)} {title} of {value}{unit} instead of {reference} "
+        f"(confidence {likely})"
+    )

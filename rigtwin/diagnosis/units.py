@@ -1,68 +1,85 @@
-"""Sizes in the units that engineers write them in. Inside and in files everything is SI."""
+"""Quantities in the units that engineers write: kN, mm, µm, ms, degrees.
+
+Computation and files use SI units. Only texts, tables and axes convert.
+"""
 
 from __future__ import annotations
 
 import math
 
-FEWEST, MOST = 1e-2, 1e4
-"""Between these a number is short in SI."""
+SHORT_FROM, SHORT_BELOW = 1e-2, 1e4
+"""Magnitudes between which a number is short enough to be written in SI units."""
 
 
 def find_unit(unit: str, largest: float) -> tuple[float, str]:
-    """The unit that engineers write a signal of this size in.
+    """Choose the unit for a signal.
 
     Parameters
     ----------
     unit
-        Of the signal, SI.
+        SI unit of the signal; "1" for a ratio.
     largest
-        Its greatest magnitude, in that unit.
+        Greatest magnitude of the signal, in `unit`.
 
     Returns
     -------
     tuple
-        What its values are multiplied by, and the unit they then have.
+        Factor by which SI values are multiplied, and the unit of the product.
     """
     base, _, rest = unit.partition("/")
     rest = f"/{rest}" if rest else ""
     if base == "rad":
         return 180.0 / math.pi, f"°{rest}"
+    # A length of 1 m or more is read in metres, one below 10 µm in micrometres.
     if base == "m" and 0.0 < largest < 1e-5:
         return 1e6, f"µm{rest}"
     if base == "m" and largest < 1.0:
         return 1e3, f"mm{rest}"
     if unit == "s" and 0.0 < largest < 0.1:
         return 1e3, "ms"
-    if base and (base[0] == "N" or base == "Pa") and largest >= MOST:
+    if base and (base[0] == "N" or base == "Pa") and largest >= SHORT_BELOW:
         return 1e-3, f"k{base}{rest}"
     return 1.0, "" if unit == "1" else unit
 
 
 def shorten(unit: str, *values: float) -> tuple[float, str]:
-    """The unit for numbers in a text: SI, unless the greatest of them is long in it."""
-    largest = max((abs(each) for each in values if math.isfinite(each)), default=0.0)
-    if largest == 0.0 or FEWEST <= largest < MOST:
+    """Choose one unit for several numbers: SI, unless the greatest of them is long in SI.
+
+    Parameters
+    ----------
+    unit
+        SI unit of the numbers; "1" for a ratio.
+    *values
+        Numbers that share the unit. Infinite ones and NaN are ignored.
+
+    Returns
+    -------
+    tuple
+        Factor by which SI values are multiplied, and the unit of the product.
+    """
+    largest = max((abs(value) for value in values if math.isfinite(value)), default=0.0)
+    if largest == 0.0 or SHORT_FROM <= largest < SHORT_BELOW:
         return 1.0, "" if unit == "1" else unit
     return find_unit(unit, largest)
 
 
-def say(value: float, unit: str, largest: float | None = None) -> str:
-    """A size of a signal with its unit, three digits. largest: greatest value of its table, which
-    the unit suits; by default the value itself."""
-    factor, shown = find_unit(unit, abs(value) if largest is None else largest)
+def say(value: float, unit: str) -> str:
+    """Write an amplitude of a signal with its unit, to three digits."""
+    factor, shown = find_unit(unit, abs(value))
     return f"{spell(factor * value, 3)} {shown}".rstrip()
 
 
-def write(value: float, unit: str, largest: float | None = None) -> str:
-    """A value with its unit, four digits. largest: greatest value of its table, which the unit
-    suits; by default the value itself."""
-    factor, shown = shorten(unit, value if largest is None else largest)
+def write(value: float, unit: str) -> str:
+    """Write a parameter's value with its unit, to four digits."""
+    factor, shown = shorten(unit, value)
     return f"{spell(factor * value, 4)} {shown}".rstrip()
 
 
 def spell(value: float, digits: int) -> str:
-    """A number with so many digits, and no exponent where it would be shorter without: 102, not
-    1.0e+02."""
-    value += 0.0  # minus zero is zero
+    """Write a number to the given number of digits, without an exponent below a million.
+
+    Python's `g` format writes 102 to two digits as 1.0e+02; a reader expects 102.
+    """
+    value += 0.0  # Adding zero turns -0.0 into 0.0.
     text = f"{value:.{digits}g}"
     return f"{value:.0f}" if "e+" in text and abs(value) < 1e6 else text

@@ -31,6 +31,7 @@ from rigtwin.description.configuration import Configuration
 from rigtwin.description.control import set_up
 from rigtwin.description.settings import Safety
 from rigtwin.errors import RigtwinError
+from rigtwin.interruptions import defer_sigint
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
 from rigtwin.simulation.converters import Sensing, sample_sensors
