@@ -150,13 +150,12 @@ class Multibody:
         self._model = self._prepare(mechanism.model)
         names = list(joints)
         ties, base = np.eye(len(joints)), np.zeros(len(joints))
-        # A tied joint moves by ratio · coordinate + offset; ties of ties follow from their order.
-        for tie in mechanism.ties():
-            if tie.to in names and tie.joint not in names:
-                place = names.index(tie.to)
-                ties = np.vstack([ties, tie.ratio * ties[place]])
-                base = np.append(base, tie.apart + tie.ratio * base[place])
-                names.append(tie.joint)
+        # A tied joint moves by ratio · coordinate + offset; chains come in the order of dependence.
+        for tie in mechanism.ties_of(joints)[0]:
+            place = names.index(tie.to)
+            ties = np.vstack([ties, tie.ratio * ties[place]])
+            base = np.append(base, tie.apart + tie.ratio * base[place])
+            names.append(tie.joint)
         self._ties, self._from, self._tied = ties, base, names
         self._numbers = [mechanism.number("joint", name) for name in names]
         self.coordinates = len(joints)

@@ -87,7 +87,7 @@ def motion_under(
         kinds=np.zeros(1, np.int64),
         loop=loop,
         command=command.astype(float),
-        besides=np.zeros(len(command)),
+        disturbance=np.zeros(len(command)),
         period=PERIOD,
         steps=steps,
         out=motion,

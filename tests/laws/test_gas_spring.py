@@ -68,15 +68,18 @@ def test_a_charge_is_pressure_and_volumes_of_a_cylinder():
 @pytest.mark.parametrize(
     ("make", "says"),
     [
-        (lambda: design(0.0, 300.0, 0.1, 1.3), "force fully extended of a gas spring is 0 N"),
-        (lambda: design(100.0, 300.0, -0.1, 1.3), "stroke of a gas spring is -0.1 m"),
-        (lambda: design(100.0, 300.0, 0.1, math.nan), "exponent of a gas spring is nan;"),
-        (lambda: design(math.inf, 300.0, 0.1, 1.3), "force fully extended of a gas spring is inf"),
-        (lambda: design(100.0, 100.0, 0.1, 1.3), "force compressed, 100 N, has to exceed"),
-        (lambda: design(100.0, math.inf, 0.1, 1.3), "force compressed, inf N, has to exceed"),
-        (lambda: find_charge(GasSpring(1.0, 0.2), 0.0, 0.1), "area of a gas spring is 0 m²"),
-        (lambda: find_charge(GasSpring(1.0, 0.2), 0.1, 0.0), "stroke of a gas spring is 0 m"),
-        (lambda: find_charge(GasSpring(1.0, 0.2), 0.1, 0.2), "leaves no room"),
+        (lambda: design(0.0, 300.0, 0.1, 1.3), "force fully extended of the gas spring is 0 N"),
+        (lambda: design(100.0, 300.0, -0.1, 1.3), "stroke of the gas spring is -0.1 m"),
+        (lambda: design(100.0, 300.0, 0.1, math.nan), "exponent of the gas spring is nan;"),
+        (
+            lambda: design(math.inf, 300.0, 0.1, 1.3),
+            "force fully extended of the gas spring is inf",
+        ),
+        (lambda: design(100.0, 100.0, 0.1, 1.3), "force of the compressed gas spring is 100 N"),
+        (lambda: design(100.0, math.inf, 0.1, 1.3), "force of the compressed gas spring is inf N"),
+        (lambda: find_charge(GasSpring(1.0, 0.2), 0.0, 0.1), "area of the gas spring is 0 m²"),
+        (lambda: find_charge(GasSpring(1.0, 0.2), 0.1, 0.0), "stroke of the gas spring is 0 m"),
+        (lambda: find_charge(GasSpring(1.0, 0.2), 0.1, 0.2), "expected less than its gas column"),
     ],
 )
 def test_an_impossible_gas_spring_is_refused(make, says):
