@@ -23,7 +23,7 @@ def damped():
 
 
 def density(level: float) -> float:
-    return misfit_of(np.array([[[level]]]), PIECES, SAMPLES, STANDARD.within)
+    return misfit_of(np.array([[[level]]]), PIECES, SAMPLES, STANDARD.within_noise_weight)
 
 
 def test_the_density_falls_with_the_residual_and_has_no_step_at_the_noise():

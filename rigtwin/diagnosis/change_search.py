@@ -113,7 +113,7 @@ class ChangeSearch:
             own = [other for other in self._own if other != number]
             estimate = self._equations.estimate(number, self._common, own)
             tested = check_homogeneity(estimate.moves, estimate.widths, self._freedom())
-            if tested.probability < self.thresholds.changed:
+            if tested.probability < self.thresholds.change_probability:
                 moves = (estimate.moves - tested.mean) * self.columns[number].step
                 found[self.columns[number].group] = moves
         return found
@@ -126,13 +126,13 @@ class ChangeSearch:
             if column.kind != "effect":
                 continue
             others = [n for n in (*self._common, *own) if n != number]
-            if np.min(self._equations.seen(number, others)) < self.thresholds.seen:
+            if np.min(self._equations.seen(number, others)) < self.thresholds.observable_share:
                 unseen.append(number)
             else:
                 candidates.append(number)
         changed: list[int] = []
         left = self._left(self._plants)
-        while len(changed) < self.thresholds.changes:
+        while len(changed) < self.thresholds.most_changes:
             tests = self._test([n for n in candidates if n not in changed], own)
             # One model for all that leaves a gap may be so far off each that no test there is sure.
             if (changed or self._settled) and not any(self._is_sure(each) for each in tests):
@@ -148,7 +148,10 @@ class ChangeSearch:
             followed = [each for each in followed if self._is_sure(each.tested)]
             best = min(followed, key=lambda each: each.left, default=None)
             pieces = float(self._equations.pieces.sum())
-            if best is None or (left / best.left - 1.0) * pieces <= self.thresholds.instead:
+            if (
+                best is None
+                or (left / best.left - 1.0) * pieces <= self.thresholds.rival_change_chi_square
+            ):
                 break
             instead = [each.tested.number for each in followed if self._is_as_good(each, best)]
             found.append(self._describe(best.tested, best.values, instead))
@@ -200,20 +203,23 @@ class ChangeSearch:
         if self._settled:
             return True
         gain = 0.5 * float(np.log(each.without / max(each.estimate.left, 1e-300)))
-        return gain >= self.thresholds.changed_share
+        return gain >= self.thresholds.change_log_error
 
     def _is_sure(self, each: _Tested) -> bool:
         """Whether a parameter is not the same, and that is no trifle beside a model's error."""
-        return each.probability < self.thresholds.changed and self._matters(each)
+        return each.probability < self.thresholds.change_probability and self._matters(each)
 
     def _is_as_good(self, each: _Followed, best: _Followed) -> bool:
         """Whether another parameter's change leaves as little as the best one's."""
         if each is best:
             return False
         share = each.left / max(best.left, 1e-300)
-        alike = 0.0 if self._settled else self.thresholds.changed_share
+        alike = 0.0 if self._settled else self.thresholds.change_log_error
         pieces = float(self._equations.pieces.sum())
-        return 0.5 * np.log(share) <= alike or (share - 1.0) * pieces <= self.thresholds.instead
+        return (
+            0.5 * np.log(share) <= alike
+            or (share - 1.0) * pieces <= self.thresholds.rival_change_chi_square
+        )
 
     def _describe(
         self, each: _Tested, followed: Array | None = None, instead: Sequence[int] = ()
@@ -227,7 +233,7 @@ class ChangeSearch:
         values = followed
         if values is None:
             values = self._values(column, self._plants) + estimate.moves * column.step
-        widths = estimate.widths * abs(column.step) * self.thresholds.wider
+        widths = estimate.widths * abs(column.step) * self.thresholds.interval_half_width
         quantity = effect.quantities()[column.parameter]
         return Parameter(
             name=Name(effect.component, effect.kind.name),

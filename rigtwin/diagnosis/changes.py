@@ -94,7 +94,9 @@ def find_changes(
                     compared = min(
                         compared,
                         other,
-                        key=lambda each: each.cost(search.pieces, thresholds.instead),
+                        key=lambda each: each.cost(
+                            search.pieces, thresholds.rival_change_chi_square
+                        ),
                     )
     covariates = _covariates(search.evidence)
     parameters = tuple(_with_trends(each, covariates, thresholds) for each in compared.parameters)
@@ -160,8 +162,10 @@ def _with_trends(
         return each
     values = np.array([interval.value for interval in each.values])
     widths = np.array([0.5 * (interval.high - interval.low) for interval in each.values])
-    trends = fit_trends(values, widths / thresholds.wider, covariates, float(BLOCKS - 1))
+    trends = fit_trends(
+        values, widths / thresholds.interval_half_width, covariates, float(BLOCKS - 1)
+    )
     rivals, named = name_trends(
-        trends, len(values), thresholds.trend_explains, thresholds.trend_clear
+        trends, len(values), thresholds.trend_share, thresholds.trend_margin
     )
     return replace(each, trends=rivals, named=named)

@@ -94,7 +94,7 @@ def support_of(
     remains = min(rest / gap, 1.0) if gap > 0.0 else 0.0
     # A rest within the model error that is expected needs no unnamed effect.
     unnamed = _logistic(rest / evidence.machine.prior.error) * _logistic(
-        posterior.rest / thresholds.rest
+        posterior.rest / thresholds.residual_excess
     )
     return Support(
         probability=posterior.inclusion(effect),
@@ -102,5 +102,5 @@ def support_of(
         steadiness=abs(best.fit.values[number][0] - nominal) / width,
         remains=remains,
         dominance=_dominance(best, number),
-        mimic=unnamed * _logistic(remains / thresholds.mimicry),
+        mimic=unnamed * _logistic(remains / thresholds.mimicry_share),
     )

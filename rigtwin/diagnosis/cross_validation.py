@@ -266,7 +266,7 @@ def validate(
 
     count = len(other.recordings)
     data = f"{count} held-out recording{'s' if count > 1 else ''}"
-    kept, rejected = reject_worsening(named, across, thresholds.worse)
+    kept, rejected = reject_worsening(named, across, thresholds.worsening_factor)
     largest = largest_shrinkage(other, evidence.plant, with_effects(evidence.plant, fit, kept))
     outside = across(kept)
     return Validation(
@@ -295,7 +295,7 @@ def with_effects(plant: Plant, fit: Fit, kept: Sequence[Effect]) -> Plant:
 
 
 def reject_worsening(
-    effects: Effects, across: Callable[[Effects], Blocks], worse: float = STANDARD.worse
+    effects: Effects, across: Callable[[Effects], Blocks], worse: float = STANDARD.worsening_factor
 ) -> tuple[Effects, Effects]:
     """Reject effects that make held-out data worse.
 

@@ -206,7 +206,7 @@ def _diagnose(
     if validation.rejected:
         names = " and ".join(effect.name for effect in validation.rejected)
         notes.append(f"{names} rejected: held-out data became worse with it")
-    if kept and left and validation.largest < thresholds.removes:
+    if kept and left and validation.largest < thresholds.removed_share:
         names = " and ".join(effect.name for effect in kept)
         share = f"{100 * validation.largest:.0f} %"
         notes.append(f"{names} not named: it closes at most {share} of any signal's gap")
@@ -218,7 +218,8 @@ def _diagnose(
     slight = [
         each
         for each in deviations
-        if each.kind in ("setting", "unknown") and each.consequence < thresholds.consequence
+        if each.kind in ("setting", "unknown")
+        and each.consequence < thresholds.controller_consequence
     ]
     notes += [describe_slight(each) for each in slight]
     deviations = [each for each in deviations if each not in slight]
@@ -228,9 +229,9 @@ def _diagnose(
     attributed = describe_attributed(found, kept, support, evidence, thresholds)
     effects = [
         *attributed,
-        *(describe_sensor(each, evidence, thresholds.sure) for each in sampled),
+        *(describe_sensor(each, evidence, thresholds.highest_confidence) for each in sampled),
         *(
-            describe_controller(each, thresholds.sure)
+            describe_controller(each, thresholds.highest_confidence)
             for each in deviations
             if each.kind != "unknown"
         ),
@@ -240,7 +241,7 @@ def _diagnose(
     closed = found.posterior.closes(found.posterior.best)
     if validation.measurable:
         closed = validation.held_out.value
-    closes = not kept or closed >= thresholds.explained
+    closes = not kept or closed >= thresholds.explained_share
     verdict: Verdict
     if effects:
         verdict = "explained" if closes and not rest else "partly explained"
@@ -288,7 +289,7 @@ def _diagnose(
         evidence.machine,
         evidence,
         corrected,
-        _alternatives(found, kept, thresholds.possible),
+        _alternatives(found, kept, thresholds.alternative_weight),
         held_out,
     )
 
@@ -425,10 +426,10 @@ def _next_test(
     likely = [
         each.scored.fit
         for each in ranking
-        if each.scored.fit.effects and each.weight >= thresholds.member * ranking[0].weight
+        if each.scored.fit.effects and each.weight >= thresholds.rival_weight * ranking[0].weight
     ]
     sure = all(
-        effect.confidence >= thresholds.unsure and len(effect.alternatives) == 1
+        effect.confidence >= thresholds.retest_confidence and len(effect.alternatives) == 1
         for effect in effects
     )
     if not tests or not kept or sure or len(likely) < 2:

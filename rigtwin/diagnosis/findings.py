@@ -66,13 +66,13 @@ def choose_named(
         found.fit.effects, found.fit.values, _widths(found, support, thresholds), strict=True
     ):
         nominal = effect.nominal(posterior.nominal)[effect.kind.parameters[0]]
-        if abs(values[0] - nominal) <= thresholds.wider * widths[0]:
+        if abs(values[0] - nominal) <= thresholds.interval_half_width * widths[0]:
             # An interval that holds the nominal value is no finding.
             continue
         shares = [posterior.inclusion(each) for each in (effect, *posterior.rivals(effect))]
         chance = min(sum(shares), 1.0) * (1.0 - support[effect].mimic)
         members = sum(shares) ** 2 / sum(share**2 for share in shares)
-        if chance >= thresholds.nameable and members <= thresholds.members:
+        if chance >= thresholds.naming_confidence and members <= thresholds.rival_count:
             named.append(effect)
     return tuple(named)
 
@@ -115,8 +115,10 @@ def describe_attributed(
         findings.append(
             Finding(
                 name=_name(effect),
-                parameters=estimates(effect, values, widths, evidence, thresholds.wider),
-                confidence=min(support[effect].confidence, thresholds.sure),
+                parameters=estimates(
+                    effect, values, widths, evidence, thresholds.interval_half_width
+                ),
+                confidence=min(support[effect].confidence, thresholds.highest_confidence),
                 alternatives=tuple(_name(each) for each in (effect, *rivals)),
                 share=shares[effect],
                 title=effect.kind.title,
@@ -163,8 +165,8 @@ def _widths(
         parts = zip(scored, fitted, posterior.spread(effect), strict=True)
         own = [math.hypot(max(one, other), spread) for one, other, spread in parts]
         off = abs(values[0] - nominal)
-        shift = thresholds.aligned / support[effect].dominance * off
-        most = max(own[0], WIDEST * off / thresholds.wider)
+        shift = thresholds.rest_correlation / support[effect].dominance * off
+        most = max(own[0], WIDEST * off / thresholds.interval_half_width)
         widths.append((min(math.hypot(own[0], shift), most), *own[1:]))
     return widths
 
@@ -220,7 +222,9 @@ def find_traces(
         return tuple(
             Finding(
                 name=_name(effect),
-                parameters=estimates(effect, values, widths, evidence, thresholds.wider),
+                parameters=estimates(
+                    effect, values, widths, evidence, thresholds.interval_half_width
+                ),
                 confidence=found.posterior.inclusion(effect),
                 alternatives=(_name(effect),),
                 share=max(gained, 0.0) / len(more),
@@ -268,7 +272,7 @@ def estimates(
     values: Sequence[float],
     widths: Sequence[float],
     evidence: Evidence,
-    wider: float = STANDARD.wider,
+    wider: float = STANDARD.interval_half_width,
 ) -> dict[str, Estimate]:
     """The parameters of an effect as fitted, with their intervals.
 

@@ -62,7 +62,7 @@ def look_first(
     gap = fitter.nothing.misfit - evidence.expected
     foremost = sorted(screened, key=lambda each: -each.promise)[:NAMED]
     most = foremost[0].promise if foremost else 0.0
-    there = gap > thresholds.rest * evidence.expected or most > 2.0 * least
+    there = gap > thresholds.residual_excess * evidence.expected or most > 2.0 * least
     suspects = [
         (
             Name(each.effect.component, each.effect.kind.name),

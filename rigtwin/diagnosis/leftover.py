@@ -83,7 +83,7 @@ def leftovers(
         noise = float(evidence.lines[0].noise[number])
         typical = rms(np.concatenate([each.measured[number] for each in evidence.lines]))
         if levels[name] < max(
-            thresholds.left_over * noise, evidence.machine.form_of(row) * typical
+            thresholds.localisation_ratio * noise, evidence.machine.form_of(row) * typical
         ):
             continue
         own = [np.where(np.arange(len(each))[:, None] == number, each, 0.0) for each in differences]

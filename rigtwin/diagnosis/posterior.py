@@ -98,7 +98,9 @@ class Posterior:
 
     def _density(self, levels: Array, scored: Scored) -> float:
         """Minus the log predictive density of a hypothesis that leaves certain levels."""
-        return 0.5 * misfit_of(levels, self._pieces, scored.samples, self._thresholds.within)
+        return 0.5 * misfit_of(
+            levels, self._pieces, scored.samples, self._thresholds.within_noise_weight
+        )
 
     def cost(self, scored: Scored) -> float:
         """Minus the score of a hypothesis, nats; infinite where a value stands at its bound."""
@@ -155,7 +157,7 @@ class Posterior:
         found = []
         for each in self.ranking:
             others = set(each.scored.fit.effects) - rest
-            if each.weight < self._thresholds.member * top or len(others) != 1:
+            if each.weight < self._thresholds.rival_weight * top or len(others) != 1:
                 continue
             (other,) = others
             if other != effect and rest <= set(each.scored.fit.effects):
@@ -177,7 +179,7 @@ class Posterior:
         """Nats that the best hypothesis loses to one that leaves noise and declared error, beyond
         what chance makes of noise."""
         levels = self.levels(self.best)
-        chance = self._thresholds.chance * np.sqrt(2.0 / np.maximum(self._pieces, 1.0))
+        chance = self._thresholds.chance_deviations * np.sqrt(2.0 / np.maximum(self._pieces, 1.0))
         within = np.minimum(levels, 1.0)
         beyond = within + np.maximum(levels - within - chance, 0.0)
         return self._density(beyond, self.best) - self._density(within, self.best)

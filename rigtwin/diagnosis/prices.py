@@ -121,8 +121,10 @@ class Prices:
         for one in range(len(new)):
             for other in range(one):
                 if new[one] and new[other]:
-                    lacking = (t.undone - scored.together[one, other]) / (0.5 * t.undone)
-                    cost += t.forbidding * float(np.clip(lacking, 0.0, 1.0))
+                    lacking = (t.cancelling_share - scored.together[one, other]) / (
+                        0.5 * t.cancelling_share
+                    )
+                    cost += t.prohibitive_price * float(np.clip(lacking, 0.0, 1.0))
         return cost
 
     def _slight(self, scored: Scored) -> float:
@@ -131,11 +133,11 @@ class Prices:
         t, cost = self._thresholds, 0.0
         even = self._fitter.evidence.machine.prior.even
         for effect, share in zip(scored.fit.effects, scored.accounts, strict=True):
-            immaterial = float(np.clip(t.material - share / self._form, 0.0, 1.0))
-            cost += even * t.forbidding * immaterial
+            immaterial = float(np.clip(t.material_model_errors - share / self._form, 0.0, 1.0))
+            cost += even * t.prohibitive_price * immaterial
             if is_rare(effect):
-                lacking = float(np.clip(1.0 - share / t.rare_share, 0.0, 1.0))
-                cost += self._discrepancy * lacking * t.rare_doubt * self._signal_samples
+                lacking = float(np.clip(1.0 - share / t.rare_amplitude_share, 0.0, 1.0))
+                cost += self._discrepancy * lacking * t.rare_immaterial_price * self._signal_samples
         return cost
 
     def _uncertain(self, scored: Scored) -> float:
@@ -146,15 +148,15 @@ class Prices:
         ):
             off = abs(values[0] - self._nominal(effect))
             sure = off / max(widths[0], 1e-300)
-            steep = 1.0 + (max(t.wider - sure, 0.0) / NEAR) ** 2
-            cost += t.unsteady * max(t.steady - sure, 0.0) ** 2 * steep
+            steep = 1.0 + (max(t.interval_half_width - sure, 0.0) / NEAR) ** 2
+            cost += t.unsteady_price * max(t.steady_standard_errors - sure, 0.0) ** 2 * steep
             tolerance = evidence.machine.tolerance_of(effect.group, effect.kind.parameters[0])
             if tolerance is not None:
                 width = evidence.width(tolerance)
                 if tolerance.relative:
                     width = tolerance.half_width * abs(self._nominal(effect))
-                beyond = t.within_tolerance - off / max(width, 1e-300)
-                cost += t.forbidding * float(np.clip(beyond, 0.0, 1.0))
+                beyond = t.tolerance_half_widths - off / max(width, 1e-300)
+                cost += t.prohibitive_price * float(np.clip(beyond, 0.0, 1.0))
         return cost
 
     def _nominal(self, effect: Effect) -> float:

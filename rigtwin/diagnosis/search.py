@@ -138,12 +138,12 @@ class Search:
         limit = self.posterior.prices.ordinary
         self.on_first_look(look_first(self.coarse, self.screened, 2.0 * limit, self.thresholds))
         most = max((each.promise for each in self.screened), default=0.0)
-        worth = self.thresholds.promising * max(most, 2.0 * limit)
+        worth = self.thresholds.promising_share * max(most, 2.0 * limit)
         promising = [each for each in self.screened if each.promise >= worth]
         singles = sorted(self.threads.map(self._fit_single, promising), key=lambda f: f.misfit)
         if singles:
             gain = max(self.coarse.nothing.misfit - singles[0].misfit, 0.0)
-            near = singles[0].misfit + self.thresholds.near * gain + 4.0 * limit
+            near = singles[0].misfit + self.thresholds.precise_fit_shortfall * gain + 4.0 * limit
             # A hypothesis far behind stays there, however the tolerances are taken.
             settled = [fit for fit in singles[:SETTLED] if fit.misfit <= near]
             self._settle(settled)
@@ -173,7 +173,7 @@ class Search:
             bool(singles)
             and (
                 self.coarse.nothing.misfit - singles[0].misfit > 2.0 * posterior.prices.ordinary
-                or posterior.rest > self.thresholds.rest
+                or posterior.rest > self.thresholds.residual_excess
             )
         )
 

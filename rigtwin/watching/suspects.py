@@ -57,7 +57,9 @@ def find_suspects(evidence: Evidence, thresholds: Thresholds = STANDARD) -> tupl
     weights /= weights.sum()
     gap = max(nothing.misfit - evidence.expected, 1e-300)
     suspects = [
-        _suspect(fit, (nothing.misfit - fit.misfit) / gap, thresholds.sure * float(weight))
+        _suspect(
+            fit, (nothing.misfit - fit.misfit) / gap, thresholds.highest_confidence * float(weight)
+        )
         for fit, weight in zip(found, weights, strict=True)
     ]
     suspects.sort(key=lambda each: -each.probability)
