@@ -10,7 +10,7 @@ import numpy as np
 from rigtwin.components import Effect
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.first_look import FirstLook
-from rigtwin.diagnosis.fit import Fit, clashes, is_possible, without_each
+from rigtwin.diagnosis.fit import Fit, clashes, is_possible, leave_one_out
 from rigtwin.diagnosis.fitter import Fitter
 from rigtwin.diagnosis.posterior import Posterior
 from rigtwin.diagnosis.search import Search
@@ -124,7 +124,7 @@ def _nest(search: Search, fit: Fit) -> list[Fit]:
     chain = [fit]
     while len(chain[0].effects) > 1:
         fewer = []
-        for _, rest, values in without_each(chain[0]):
+        for _, rest, values in leave_one_out(chain[0]):
             if not is_possible(rest, search.fine.plant):
                 continue
             known = search.pool.get(frozenset(rest))

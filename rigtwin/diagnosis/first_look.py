@@ -59,7 +59,7 @@ def look_first(
         Its suspects.
     """
     evidence = fitter.evidence
-    gap = fitter.nothing.misfit - evidence.expected
+    gap = fitter.nominal_fit.misfit - evidence.expected
     foremost = sorted(screened, key=lambda each: -each.promise)[:NAMED]
     most = foremost[0].promise if foremost else 0.0
     there = gap > thresholds.residual_excess * evidence.expected or most > 2.0 * least

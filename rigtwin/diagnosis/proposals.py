@@ -77,7 +77,7 @@ def propose_additions(
             return None
         starts, responses = zip(*fitter.responses_beside(effect, first), strict=True)
         # An effect that takes a tolerance's place is not what that tolerance may take up.
-        own = space.beside((effect,))
+        own = space.without_replaced((effect,))
         power, alike = own.strengths(np.stack(responses, axis=1).astype(np.float64), residual)
         power = np.maximum(power, 1e-300)
         # A response may be too strong or too weak, but not the other way round.
@@ -158,7 +158,7 @@ def propose_replacements(
         def resemble(other: Effect, response: Array = response) -> tuple[float, Effect, Values]:
             starts, responses = zip(*fitter.responses_beside(other, fit), strict=True)
             # An effect that takes a tolerance's place is not what that tolerance may take up.
-            space = fitter.space.beside((other,))
+            space = fitter.space.without_replaced((other,))
             both = np.column_stack([np.stack(responses, axis=1).astype(np.float64), response])
             shapes = space.project_out(both)
             shapes, own = shapes[:, :-1], shapes[:, -1]

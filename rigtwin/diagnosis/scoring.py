@@ -30,7 +30,7 @@ from rigtwin.diagnosis.blocks import (
 from rigtwin.diagnosis.fit import Fit, Values, with_values
 from rigtwin.diagnosis.fitter import Fitter
 from rigtwin.diagnosis.gauss_newton import shorten, take_derivatives
-from rigtwin.diagnosis.space import BEYOND, PRIOR
+from rigtwin.diagnosis.space import BOUND, PRIOR
 from rigtwin.numerics.arrays import Array
 
 FOLDS = 5
@@ -134,7 +134,7 @@ class Scorer:
         def residual(vector: Array) -> Array:
             return evidence.residual(with_values(base, fit.effects, _split(vector, sizes)))
 
-        space = fitter.space.beside(fit.effects)
+        space = fitter.space.without_replaced(fit.effects)
         here = np.concatenate([np.asarray(v, float) for v in fit.values]) if count else np.zeros(0)
         left = residual(here)
         used = np.array(fit.used) if fit.used else np.zeros(space.columns.shape[1])
@@ -149,7 +149,7 @@ class Scorer:
             columns = take_derivatives(residual, here, left, steps, high)
         # Tolerances that stand at their bound stay there; the others are free about their estimate.
         found = space.estimate_tolerances(left + space.columns @ used)
-        free = np.abs(found) < BEYOND
+        free = np.abs(found) < BOUND
         left = left + space.columns @ (used - found)
         free &= np.any(space.columns != 0.0, axis=0)
         stack = np.column_stack([columns, -space.columns[:, free], left])

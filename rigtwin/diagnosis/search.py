@@ -133,7 +133,7 @@ class Search:
     def _fit_singles(self) -> list[Fit]:
         """Fit the nominal plant and each promising effect alone."""
         self.screened = self.threads.map(self.coarse.screen, self.effects)
-        nothing = self.fine.refit_with_tolerances(self.fine.nothing)
+        nothing = self.fine.refit_with_tolerances(self.fine.nominal_fit)
         self._add([nothing])
         limit = self.posterior.prices.ordinary
         self.on_first_look(look_first(self.coarse, self.screened, 2.0 * limit, self.thresholds))
@@ -142,7 +142,7 @@ class Search:
         promising = [each for each in self.screened if each.promise >= worth]
         singles = sorted(self.threads.map(self._fit_single, promising), key=lambda f: f.misfit)
         if singles:
-            gain = max(self.coarse.nothing.misfit - singles[0].misfit, 0.0)
+            gain = max(self.coarse.nominal_fit.misfit - singles[0].misfit, 0.0)
             near = singles[0].misfit + self.thresholds.precise_fit_shortfall * gain + 4.0 * limit
             # A hypothesis far behind stays there, however the tolerances are taken.
             settled = [fit for fit in singles[:SETTLED] if fit.misfit <= near]
@@ -172,7 +172,7 @@ class Search:
         return bool(posterior.best.fit.effects) or (
             bool(singles)
             and (
-                self.coarse.nothing.misfit - singles[0].misfit > 2.0 * posterior.prices.ordinary
+                self.coarse.nominal_fit.misfit - singles[0].misfit > 2.0 * posterior.prices.ordinary
                 or posterior.rest > self.thresholds.residual_excess
             )
         )

@@ -8,7 +8,7 @@ from collections.abc import Collection, Sequence
 from itertools import combinations, product
 
 from rigtwin.components import Effect, Guide
-from rigtwin.diagnosis.fit import Fit, Values, clashes, is_possible, with_values, without_each
+from rigtwin.diagnosis.fit import Fit, Values, clashes, is_possible, leave_one_out, with_values
 from rigtwin.diagnosis.fitter import Fitter
 from rigtwin.diagnosis.prices import is_rare
 
@@ -83,7 +83,7 @@ def start_unfolded(fitter: Fitter, leader: Fit, candidates: Sequence[Effect]) ->
     """Start a lag and a delay in the place of an effect of second order, which they resemble at low
     frequencies; parameters as of `start_in_series`."""
     found = []
-    for effect, rest, values in without_each(leader):
+    for effect, rest, values in leave_one_out(leader):
         pair = [
             each
             for each in candidates
@@ -112,7 +112,7 @@ def start_merged(leader: Fit) -> list[Start]:
     """Start one lag or delay in the place of two: in a loop only their sum can be seen, and the
     data may be explained by either alone; parameters as of `start_in_series`."""
     found = []
-    for effect, rest, values in without_each(leader):
+    for effect, rest, values in leave_one_out(leader):
         if effect.kind.name not in LATE_BY_TIME:
             continue
         time = leader.values[leader.effects.index(effect)][0]
@@ -128,7 +128,7 @@ def start_regular_instead(fitter: Fitter, leader: Fit, candidates: Sequence[Effe
     are: what few machines have has to be compared with what all have; parameters as of
     `start_in_series`."""
     found: list[Start] = []
-    for effect, rest, values in without_each(leader):
+    for effect, rest, values in leave_one_out(leader):
         if not is_rare(effect):
             continue
         for other in candidates:

@@ -41,7 +41,7 @@ def find_suspects(evidence: Evidence, thresholds: Thresholds = STANDARD) -> tupl
     # Twice the nats that an effect must gain where noise alone is left, as chi-square.
     price = 2.0 * (thresholds.occam_quiet + thresholds.materiality * evidence.expected)
     fitter, least = Fitter(searched), price
-    nothing = fitter.nothing
+    nothing = fitter.nominal_fit
     with Threads() as threads:
         screened = threads.map(fitter.screen, candidates(evidence))
         screened.sort(key=lambda each: -each.promise)
