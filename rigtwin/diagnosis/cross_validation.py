@@ -13,7 +13,7 @@ from rigtwin.components.plant import Plant
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.finding import Interval
 from rigtwin.diagnosis.fit import Fit, with_values
-from rigtwin.diagnosis.posterior import Posterior
+from rigtwin.diagnosis.posterior import HypothesisPosterior
 from rigtwin.diagnosis.thresholds import STANDARD, Thresholds
 from rigtwin.numerics.arrays import Array
 
@@ -214,7 +214,7 @@ def validate(
     evidence: Evidence,
     fit: Fit,
     named: Effects,
-    posterior: Posterior,
+    posterior: HypothesisPosterior,
     other: Evidence | None = None,
     thresholds: Thresholds = STANDARD,
 ) -> Validation:

@@ -298,7 +298,7 @@ def _leaves_something(found: Explanation, kept: Sequence[Effect]) -> bool:
     """Whether more than noise and declared error is left once the kept effects are corrected."""
     posterior = found.posterior
     if set(kept) == set(posterior.best.fit.effects):
-        return posterior.leaves_something
+        return posterior.has_unexplained_residual
     known = [each.scored for each in posterior.ranking if set(each.scored.fit.effects) == set(kept)]
     # What was fitted and is not named leaves what it explained.
     scored = known[0] if known else posterior.empty

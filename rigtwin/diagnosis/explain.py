@@ -12,8 +12,8 @@ from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.first_look import FirstLook
 from rigtwin.diagnosis.fit import Fit, clashes, is_possible, leave_one_out
 from rigtwin.diagnosis.fitter import Fitter
-from rigtwin.diagnosis.posterior import Posterior
-from rigtwin.diagnosis.search import Search
+from rigtwin.diagnosis.posterior import HypothesisPosterior
+from rigtwin.diagnosis.search import HypothesisSearch
 from rigtwin.diagnosis.threads import Threads
 from rigtwin.diagnosis.thresholds import STANDARD, Thresholds
 
@@ -37,7 +37,7 @@ class Explanation:
         Nested fits that lead to the best hypothesis, of one effect first.
     """
 
-    posterior: Posterior
+    posterior: HypothesisPosterior
     fit: Fit
     unobservable: tuple[Effect, ...]
     chain: tuple[Fit, ...]
@@ -65,7 +65,7 @@ def explain(
     thresholds: Thresholds = STANDARD,
     first_look: Callable[[FirstLook], object] = lambda _: None,
 ) -> Explanation:
-    """Search all candidates for what explains the evidence.
+    """HypothesisSearch all candidates for what explains the evidence.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ def explain(
     """
     effects = candidates(evidence)
     with Threads(progress) as threads:
-        search = Search(evidence, effects, thresholds, threads, first_look)
+        search = HypothesisSearch(evidence, effects, thresholds, threads, first_look)
         posterior = search.run()
         best = posterior.best.fit
         fit = best
@@ -99,7 +99,7 @@ def explain(
         )
 
 
-def _unobservable(search: Search, posterior: Posterior) -> tuple[Effect, ...]:
+def _unobservable(search: HypothesisSearch, posterior: HypothesisPosterior) -> tuple[Effect, ...]:
     """Effects that do nothing at the nominal plant, and nothing beside the best hypothesis either,
     as a refinement of friction does where there is none."""
     coarse, best = search.coarse, posterior.best.fit
@@ -119,7 +119,7 @@ def _unobservable(search: Search, posterior: Posterior) -> tuple[Effect, ...]:
     return tuple(effect for effect in search.effects if not shows(effect))
 
 
-def _nest(search: Search, fit: Fit) -> list[Fit]:
+def _nest(search: HypothesisSearch, fit: Fit) -> list[Fit]:
     """The best hypothesis, and before it the best with one effect fewer each time."""
     chain = [fit]
     while len(chain[0].effects) > 1:

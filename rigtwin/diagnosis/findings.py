@@ -15,7 +15,7 @@ from rigtwin.diagnosis.evidence import Evidence, relative_errors
 from rigtwin.diagnosis.explain import Explanation
 from rigtwin.diagnosis.finding import Estimate, Finding, Name, Nearest, Rival, Unobservable
 from rigtwin.diagnosis.fit import Fit
-from rigtwin.diagnosis.posterior import Posterior
+from rigtwin.diagnosis.posterior import HypothesisPosterior
 from rigtwin.diagnosis.sampling import SensorProperty
 from rigtwin.diagnosis.support import Support
 from rigtwin.diagnosis.text import tell_apart
@@ -172,7 +172,7 @@ def _widths(
 
 
 def _shares(
-    fit: Fit, kept: Sequence[Effect], evidence: Evidence, posterior: Posterior
+    fit: Fit, kept: Sequence[Effect], evidence: Evidence, posterior: HypothesisPosterior
 ) -> dict[Effect, float]:
     """Share of the gap of each effect: what would come back without it, of what would for all."""
     explained = min(max(1.0 - (1.0 - posterior.closes(posterior.best)) ** 2, 0.0), 1.0)
