@@ -198,7 +198,7 @@ def _diagnose(
     named = choose_named(found, support, thresholds)
     progress("judging on held-out data", 1)
     validation = validate(evidence, found.fit, named, found.posterior, held_out, thresholds)
-    kept = validation.kept
+    kept = validation.accepted
     left = _leaves_something(found, kept)
     notes = [*_notes(evidence.recordings), *_clipping_notes(evidence)]
     notes += find_stops(evidence.machine, evidence.recordings)
