@@ -40,8 +40,8 @@ def find_stops(machine: Machine, recordings: Sequence[Recording]) -> list[str]:
     for name, component in machine.components.items():
         if measures(getattr(machine.plant, name)) != "position" or len(component.acts_on) != 1:
             continue
-        # A sensor may count against its joint. The coefficient then is negative, and sorting puts the
-        # transformed ends in order.
+        # A sensor may count against its joint. The coefficient is negative then, and sorting puts
+        # the transformed ends in order.
         joint, coefficient = component.acts_on[0]
         number = model.joint(joint).id
         if not model.jnt_limited[number] or component.channel is None:
