@@ -166,7 +166,8 @@ def compare_recordings(
     for recording in (first, second):
         if recording.machine != machine.name:
             raise RigtwinError(
-                f"{recording.path}: it is of machine {recording.machine!r}; expected {machine.name!r}"
+                f"{recording.path}: it is of machine {recording.machine!r}; "
+                f"expected {machine.name!r}"
             )
     if first.period != second.period:
         raise RigtwinError(
