@@ -12,7 +12,7 @@ from rigtwin.diagnosis.explain import candidates, explain
 from rigtwin.diagnosis.fit import with_values
 from rigtwin.diagnosis.fitter import Fitter
 from rigtwin.diagnosis.linearised import Linearised
-from rigtwin.diagnosis.space import BEYOND, Space
+from rigtwin.diagnosis.space import BOUND, Space
 from tests.helpers.twin import RIG, evidence_of, recorded, rig_effect
 
 DIRECT = {"hum", "noise", "quantisation", "missed_ticks"}
@@ -46,7 +46,7 @@ def test_starts_lie_within_bounds_and_away_from_nominal(nominal):
 
 
 def test_the_nominal_twin_leaves_what_noise_leaves(nominal):
-    fit = Fitter(nominal).nothing
+    fit = Fitter(nominal).nominal_fit
     assert 0.85 < fit.misfit / nominal.expected < 1.08
 
 
@@ -86,7 +86,7 @@ def test_an_effect_is_found_at_its_size(text):
     nominal = effect.nominal(RigPlant())[effect.kind.parameters[0]]
     wanted = float(value) - (0.0 if nominal > 1e8 else nominal)
     assert fit.values[0][0] - (float(value) - wanted) == pytest.approx(wanted, rel=MADE[text])
-    assert fitter.nothing.misfit - fit.misfit > DETECTED
+    assert fitter.nominal_fit.misfit - fit.misfit > DETECTED
 
 
 def test_tolerances_take_up_what_is_within_them_and_no_more(nominal):
@@ -113,7 +113,7 @@ def test_tolerances_take_up_what_is_within_them_and_no_more(nominal):
                 space.estimate_tolerances(clean - 50.0 * nominal.tolerance_responses(plant)[:, 0])
             )
         )
-        <= BEYOND
+        <= BOUND
     )
 
 
@@ -127,7 +127,7 @@ def test_an_effect_in_a_tolerances_place_promises_what_it_explains(name, value):
     fitter = Fitter(evidence)
     promised = fitter.screen(rig).promise
     made = evidence.residual(with_values(evidence.plant, (rig,), ((value,),)))
-    explained = fitter.nothing.misfit - fitter.space.beside((rig,)).misfit(made)
+    explained = fitter.nominal_fit.misfit - fitter.space.without_replaced((rig,)).misfit(made)
     assert 0.8 * explained < promised < 1.2 * explained
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from rigtwin.diagnosis.blocks import count_independent, find_bands, split_transforms
 from rigtwin.diagnosis.explain import explain
-from rigtwin.diagnosis.posterior import Posterior, misfit_of
+from rigtwin.diagnosis.posterior import HypothesisPosterior, deviance
 from rigtwin.diagnosis.support import Support
 from rigtwin.diagnosis.thresholds import STANDARD
 from tests.helpers.twin import evidence_of, recorded
@@ -23,7 +23,7 @@ def damped():
 
 
 def density(level: float) -> float:
-    return misfit_of(np.array([[[level]]]), PIECES, SAMPLES, STANDARD.within)
+    return deviance(np.array([[[level]]]), PIECES, SAMPLES, STANDARD.within_noise_weight)
 
 
 def test_the_density_falls_with_the_residual_and_has_no_step_at_the_noise():
@@ -79,7 +79,7 @@ def test_a_rival_that_does_worse_takes_no_more_weight(damped):
     for factor in (1.0 + 1e-9, 1.01, 2.0):
         worse = [replace(each, levels=factor * each.levels) for each in others]
         pool = [posterior.best, *worse]
-        again = Posterior(pool, posterior._fitter, 59, STANDARD)
+        again = HypothesisPosterior(pool, posterior._fitter, 59, STANDARD)
         assert again.inclusion(effect) >= before - 1e-6
 
 

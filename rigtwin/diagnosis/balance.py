@@ -1,8 +1,14 @@
-"""Magnitudes to start from, by the balance of forces along a measured motion.
+"""Starting values from the balance of forces along a measured motion.
 
-How a joint that swings with little damping goes on depends on all that acts on it before, so a twin
-without its friction says little of what is there. The forces that its measured motion takes depend
-on what acts at each moment alone, and most effects change them in proportion.
+The simulated motion of a lightly damped joint depends on the whole past, so that a twin without the
+joint's friction soon departs from the measurement. The equation of motion, evaluated along the
+measured motion, holds at every moment. Its error F0, the missing force, changes in proportion to
+most effects. With the change D_i of the missing force for the trial value of effect i,
+
+    min over s of |F0 + sum_i s_i D_i|^2
+
+is a linear least-squares problem, as in the identification of robots by their inverse dynamics
+model [Gautier, Khalil, IEEE Trans. Robot. Autom. 8 (1992) 368].
 """
 
 from __future__ import annotations
@@ -17,35 +23,36 @@ from rigtwin.diagnosis.fitter import Fitter
 
 
 def balance_forces(fitter: Fitter, effects: Sequence[Effect]) -> Values | None:
-    """The magnitudes of several effects with which least force is missing.
+    """Return the magnitudes of several effects with which the missing force is least.
 
     Parameters
     ----------
     fitter
-        Of the evidence.
+        Fitter of the evidence.
     effects
-        Of one parameter each.
+        Effects with a single parameter.
 
     Returns
     -------
     tuple or None
-        Within the effects' bounds; None where nothing that goes by itself is observed, or its
-        forces do not tell.
+        Magnitudes within the effects' bounds. None where no measured joint moves freely, or the
+        missing force is not finite.
     """
     evidence, plant = fitter.evidence, fitter.plant
     missing = evidence.missing_force(plant)
     if missing is None:
         return None
     nominal = np.array([effect.nominal(plant)[effect.kind.parameters[0]] for effect in effects])
-    tried = np.array([fitter.starts(effect).values[0][0] for effect in effects])
+    trial = np.array([fitter.starts(effect).values[0][0] for effect in effects])
     columns = np.empty((len(missing), len(effects)))
     for number, effect in enumerate(effects):
-        there = evidence.missing_force(with_values(plant, [effect], [(float(tried[number]),)]))
-        assert there is not None
-        columns[:, number] = there - missing
+        changed = evidence.missing_force(with_values(plant, [effect], [(float(trial[number]),)]))
+        # Whether a joint moves freely is a property of the machine, not of the effect.
+        assert changed is not None
+        columns[:, number] = changed - missing
     if not (np.isfinite(columns).all() and np.isfinite(missing).all()):
         return None
     shares = np.linalg.lstsq(columns, -missing, rcond=None)[0]
     low, high = fitter.bounds(effects)
-    found = np.clip(nominal + shares * (tried - nominal), low, high)
-    return tuple((float(value),) for value in found)
+    magnitudes = np.clip(nominal + shares * (trial - nominal), low, high)
+    return tuple((float(value),) for value in magnitudes)

@@ -1,7 +1,9 @@
 """Whitened residuals cut into bands of frequency and blocks of time.
 
-A whitened vector has the spectra of all signals of all recordings one after another. Each band of a
-spectrum is moved down to 0 Hz and transformed back, so that its power at every moment is known.
+A whitened vector holds the spectra of all signals of all recordings one after another. Each band of
+a spectrum is shifted down to 0 Hz and transformed back to the time domain. This complex
+demodulation gives the power of the band at every moment, and by Parseval's theorem it preserves
+all sums of products over the band.
 """
 
 from __future__ import annotations
@@ -18,21 +20,22 @@ from rigtwin.diagnosis.fit import Fit
 from rigtwin.numerics.arrays import Array
 
 BLOCKS = 20
-"""Blocks of each recording."""
+"""Number of blocks of each recording."""
 FEWEST = 3
-"""Independent samples that a residual has in each block at least, however narrow its band."""
+"""Minimum number of independent samples of a residual in each block, however narrow its band."""
 NARROWEST = 2 * BLOCKS
-"""Lines of the lowest band; each band is twice as wide as the one before."""
+"""Number of lines of the lowest band. Each band is twice as wide as the one below it."""
 TINY = 1e-300
+"""Smallest divisor."""
 
 
 def split_transforms(evidence: Evidence, vector: Array) -> list[NDArray[np.complex128]]:
-    """Undo `Evidence.whiten`.
+    """Split a whitened vector into spectra: the inverse of `Evidence.whiten`.
 
     Parameters
     ----------
     evidence
-        The evidence that whitened it.
+        Evidence that whitened the vector.
     vector
         Whitened signals as one vector, shape (size,).
 
@@ -41,30 +44,30 @@ def split_transforms(evidence: Evidence, vector: Array) -> list[NDArray[np.compl
     list of arrays
         Weighted spectra, shape (signals, lines) for each recording.
     """
-    found, place = [], 0
+    spectra, place = [], 0
     for lines in evidence.lines:
         size = lines.weight.size
         real, imaginary = vector[place : place + size], vector[place + size : place + 2 * size]
-        found.append((real + 1j * imaginary).reshape(lines.weight.shape))
+        spectra.append((real + 1j * imaginary).reshape(lines.weight.shape))
         place += 2 * size
-    return found
+    return spectra
 
 
 def find_bands(lines: int, even: float) -> list[slice]:
-    """Bands of frequency, each twice as wide as the one below it.
+    """Divide a spectrum into bands of frequency, each twice as wide as the one below it.
 
     Parameters
     ----------
     lines
-        Lines of a spectrum.
+        Number of lines of a spectrum.
     even
-        Share of the model error that is spread evenly: see `ModelPrior`. Where all of it is, one
-        scale holds for all frequencies.
+        Share of the declared model error that is spread evenly, see `ModelPrior`. At 1 there is a
+        single band, as one scale applies to all frequencies.
 
     Returns
     -------
     list of slice
-        Lines of each band; the last one has what remains.
+        Lines of each band. The last band has all remaining lines.
     """
     if even == 1.0:
         return [slice(0, lines)]
@@ -76,17 +79,17 @@ def find_bands(lines: int, even: float) -> list[slice]:
 
 
 def count_samples(evidence: Evidence) -> Array:
-    """Count the real numbers that each band of each signal consists of.
+    """Count the samples of each band of each signal: two real numbers for each line.
 
     Parameters
     ----------
     evidence
-        The evidence.
+        Evidence with its spectra.
 
     Returns
     -------
     array
-        Shape (recordings, signals, bands).
+        Number of samples, shape (recordings, signals, bands).
     """
     even = evidence.machine.prior.even
     return align(
@@ -104,125 +107,141 @@ def count_samples(evidence: Evidence) -> Array:
 
 
 def count_independent(evidence: Evidence, residual: Array) -> Array:
-    """Count the independent samples that a residual consists of.
+    """Estimate the number of independent samples of a residual.
 
-    A band of N lines of equal expected power has 2 N, for real and imaginary parts; a residual that
-    stands in few lines has few.
+    With the power P_k in line k, it is 4 (sum P_k)^2 / sum P_k^2, the participation ratio. White
+    noise in N lines has 2 N independent samples, for the real and imaginary parts. A residual that
+    is concentrated in few lines has few.
 
     Parameters
     ----------
     evidence
-        The evidence.
+        Evidence with its spectra.
     residual
-        Whitened, shape (size,).
+        Whitened residual, shape (size,).
 
     Returns
     -------
     array
-        Shape (recordings, signals, bands).
+        Number of independent samples, shape (recordings, signals, bands).
     """
     counts = []
     for spectrum in split_transforms(evidence, residual):
         power = np.abs(spectrum) ** 2
-        own = []
+        by_band = []
         for band in find_bands(power.shape[1], evidence.machine.prior.even):
             total, squared = power[:, band].sum(axis=1), (power[:, band] ** 2).sum(axis=1)
-            # The powers of white noise are exponentially distributed, of which the participation
-            # ratio counts half: 4 instead of 2.
+            # The powers of white noise are exponentially distributed, with E[P^2] = 2 E[P]^2. The
+            # plain ratio is therefore N / 2, and the factor for 2 N samples is 4.
             most = 2.0 * np.count_nonzero(power[:, band], axis=1)
-            own.append(np.minimum(4.0 * total**2 / np.maximum(squared, TINY), most))
-        counts.append(np.stack(own, axis=1))
+            by_band.append(np.minimum(4.0 * total**2 / np.maximum(squared, TINY), most))
+        counts.append(np.stack(by_band, axis=1))
     return np.maximum(align(counts), float(FEWEST * BLOCKS))
 
 
 def align(arrays: Sequence[Array]) -> Array:
-    """Stack arrays of shape (signals, bands, ...), zeros where a recording has fewer bands."""
-    most = max(each.shape[1] for each in arrays)
-    found = np.zeros((len(arrays), arrays[0].shape[0], most, *arrays[0].shape[2:]))
-    for whole, each in zip(found, arrays, strict=True):
-        whole[:, : each.shape[1]] = each
-    return found
+    """Stack arrays of recordings with different numbers of bands.
+
+    Parameters
+    ----------
+    arrays
+        Arrays of shape (signals, bands, ...), one for each recording.
+
+    Returns
+    -------
+    array
+        Shape (recordings, signals, bands, ...), with zeros for bands that a recording lacks.
+    """
+    most = max(part.shape[1] for part in arrays)
+    stacked = np.zeros((len(arrays), arrays[0].shape[0], most, *arrays[0].shape[2:]))
+    for place, part in zip(stacked, arrays, strict=True):
+        place[:, : part.shape[1]] = part
+    return stacked
 
 
 def excess_by_band(evidence: Evidence, fit: Fit) -> Array:
-    """Average over each band the noise at a fit beyond that at the nominal plant.
+    """Return the propagated noise at a fit beyond that at the nominal plant, averaged over bands.
 
     Parameters
     ----------
     evidence
-        The evidence.
+        Evidence with its spectra.
     fit
-        Fit whose plant is meant.
+        Fit whose plant propagates the noise.
 
     Returns
     -------
     array
         Variance in units of noise and declared error, shape (recordings, signals, bands).
     """
-    even, found = evidence.machine.prior.even, []
+    even, averages = evidence.machine.prior.even, []
     for lines, excess in zip(evidence.lines, evidence.excess_noise(fit.plant), strict=True):
         bands = find_bands(lines.weight.shape[1], even)
         if excess is None:
-            found.append(np.zeros((lines.weight.shape[0], len(bands))))
+            averages.append(np.zeros((lines.weight.shape[0], len(bands))))
             continue
         counted = lines.weight > 0.0
-        own = [
+        by_band = [
             np.sum(excess[:, band], axis=1) / np.maximum(np.sum(counted[:, band], axis=1), 1)
             for band in bands
         ]
-        found.append(np.stack(own, axis=1))
-    return align(found)
+        averages.append(np.stack(by_band, axis=1))
+    return align(averages)
 
 
 def block_products(evidence: Evidence, stack: Array) -> tuple[Array, Array]:
-    """Multiply whitened columns with each other in every block.
+    """Return the products of whitened columns with each other in every block.
 
     Parameters
     ----------
     evidence
-        The evidence.
+        Evidence with its spectra.
     stack
         Whitened columns, shape (size, columns).
 
     Returns
     -------
     tuple
-        Products, shape (recordings, signals, bands, blocks, columns, columns); and the power that
-        noise and declared error have there, shape (recordings, signals, bands, blocks).
+        Products, shape (recordings, signals, bands, blocks, columns, columns), and the expected
+        power of noise and declared error, shape (recordings, signals, bands, blocks).
     """
     spectra = [split_transforms(evidence, column) for column in stack.T]
     products, expected = [], []
     for number, lines in enumerate(evidence.lines):
-        columns = np.stack([each[number] for each in spectra])
+        columns = np.stack([spectrum[number] for spectrum in spectra])
         noise = 2.0 * (lines.weight > 0.0)
-        own, powers = [], []
+        by_band, powers = [], []
         for band in find_bands(columns.shape[2], evidence.machine.prior.even):
             blocks = _cut(columns[:, :, band], lines.measured.shape[1] / lines.length)
-            own.append(blocks @ blocks.transpose(0, 1, 3, 2))
+            by_band.append(blocks @ blocks.transpose(0, 1, 3, 2))
+            # Noise is stationary, so that a block has the share of its power that its part of the
+            # squared window has.
             edges = np.linspace(0, lines.fade.shape[1], BLOCKS + 1).astype(int)
             share = np.add.reduceat(lines.fade**2, edges[:-1], axis=1)
             share /= np.maximum(share.sum(axis=1, keepdims=True), TINY)
             powers.append(share * noise[:, band].sum(axis=1)[:, None])
-        products.append(np.stack(own, axis=1))
+        products.append(np.stack(by_band, axis=1))
         expected.append(np.stack(powers, axis=1))
     return align(products), align(expected)
 
 
 def _cut(columns: NDArray[np.complex128], part: float) -> Array:
-    """Spectra of one band as signals in blocks of time, shape (signals, blocks, columns, samples).
+    """Transform one band to the time domain, and cut it into blocks.
 
-    The band is moved down to start at 0 Hz, which leaves powers and products as they are.
-    part: share of the transform's length that the recording fills.
+    The band is shifted down to 0 Hz, which preserves powers and products. `part` is the share of
+    the transform's length that the recording fills; the rest is padding. The result has the shape
+    (signals, blocks, columns, samples), with zeros after the shorter blocks.
     """
     columns = columns.copy()
-    # Twice as many samples as lines, so that the last line is no Nyquist line, which would lose its
-    # imaginary part; neither must the first be the mean. By Parseval sum |X|^2 = (n / 2) sum x^2.
+    # The inverse transform ignores the imaginary parts of its first and last line, the mean and the
+    # Nyquist line. One zero is put before the band, and there are more than twice as many samples
+    # as lines, so that no line of the band is either. By Parseval sum |X|^2 = (n / 2) sum x^2.
     samples = 2 * (columns.shape[2] + 1)
     padded = np.concatenate([np.zeros((*columns.shape[:2], 1)), columns], axis=2)
     signals = np.fft.irfft(padded, samples, axis=2) * math.sqrt(samples / 2.0)
     edges = np.linspace(0, min(math.ceil(samples * part), samples), BLOCKS + 1).astype(int)
     longest = int(np.max(np.diff(edges)))
-    found = np.zeros((signals.shape[1], BLOCKS, signals.shape[0], longest))
+    cut = np.zeros((signals.shape[1], BLOCKS, signals.shape[0], longest))
     for block, (low, high) in enumerate(pairwise(edges)):
-        found[:, block, :, : high - low] = signals[:, :, low:high].transpose(1, 0, 2)
-    return found
+        cut[:, block, :, : high - low] = signals[:, :, low:high].transpose(1, 0, 2)
+    return cut

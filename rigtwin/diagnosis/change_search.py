@@ -193,7 +193,7 @@ class ChangeSearch:
             nuisances = [n for n in self._nuisances if n != number]
             estimate = self._equations.estimate(number, self._common, nuisances)
             test = check_homogeneity(estimate.moves, estimate.widths, FREEDOM)
-            if test.probability < self.thresholds.changed:
+            if test.probability < self.thresholds.change_probability:
                 moves = (estimate.moves - test.mean) * self.columns[number].step
                 differing[self.columns[number].group] = moves
         return differing
@@ -210,7 +210,7 @@ class ChangeSearch:
         candidates, invisible = self._sort_by_visibility()
         changed: list[int] = []
         misfit = self._misfit(self._plants)
-        while len(changed) < self.thresholds.changes:
+        while len(changed) < self.thresholds.most_changes:
             tests = self._test([n for n in candidates if n not in changed], free)
             # A joint model that leaves a gap may be far off every recording. The linear tests are
             # then not decisive, and the best candidates are fitted in any case.
@@ -218,7 +218,10 @@ class ChangeSearch:
                 break
             best, fitted = self._fit_best(tests, free)
             pieces = float(self._equations.pieces.sum())
-            if best is None or (misfit / best.misfit - 1.0) * pieces <= self.thresholds.instead:
+            if (
+                best is None
+                or (misfit / best.misfit - 1.0) * pieces <= self.thresholds.rival_change_chi_square
+            ):
                 break
             alternatives = [
                 rival.tested.number for rival in fitted if self._is_as_good(rival, best)
@@ -244,7 +247,9 @@ class ChangeSearch:
                 continue
             nuisances = [n for n in (*self._common, *self._nuisances) if n != number]
             shares = self._equations.visible_share(number, nuisances)
-            (invisible if np.min(shares) < self.thresholds.seen else visible).append(number)
+            (invisible if np.min(shares) < self.thresholds.observable_share else visible).append(
+                number
+            )
         return visible, invisible
 
     def _fit_best(
@@ -311,20 +316,23 @@ class ChangeSearch:
         if self._settled:
             return True
         gain = 0.5 * float(np.log(test.without / max(test.estimate.misfit, 1e-300)))
-        return gain >= self.thresholds.changed_share
+        return gain >= self.thresholds.change_log_error
 
     def _is_certain(self, test: _TestedParameter) -> bool:
         """Return whether a parameter surely differs, by a noticeable amount."""
-        return test.probability < self.thresholds.changed and self._is_material(test)
+        return test.probability < self.thresholds.change_probability and self._is_material(test)
 
     def _is_as_good(self, rival: _FittedParameter, best: _FittedParameter) -> bool:
         """Return whether the change of another parameter explains as much as the best one."""
         if rival is best:
             return False
         ratio = rival.misfit / max(best.misfit, 1e-300)
-        margin = 0.0 if self._settled else self.thresholds.changed_share
+        margin = 0.0 if self._settled else self.thresholds.change_log_error
         pieces = float(self._equations.pieces.sum())
-        return 0.5 * np.log(ratio) <= margin or (ratio - 1.0) * pieces <= self.thresholds.instead
+        return (
+            0.5 * np.log(ratio) <= margin
+            or (ratio - 1.0) * pieces <= self.thresholds.rival_change_chi_square
+        )
 
     def _describe(
         self,
@@ -344,7 +352,7 @@ class ChangeSearch:
         values = fitted
         if values is None:
             values = self._values(column, self._plants) + estimate.moves * column.step
-        half_widths = estimate.widths * abs(column.step) * self.thresholds.wider
+        half_widths = estimate.widths * abs(column.step) * self.thresholds.interval_half_width
         rivals = (self.columns[number].effect for number in alternatives)
         return ComparedParameter(
             name=Name(effect.component, effect.kind.name),

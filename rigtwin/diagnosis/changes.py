@@ -147,7 +147,7 @@ def _restart(
         model = min(
             model,
             restarted,
-            key=lambda candidate: candidate.cost(search.pieces, thresholds.instead),
+            key=lambda candidate: candidate.cost(search.pieces, thresholds.rival_change_chi_square),
         )
     return model
 
@@ -203,9 +203,11 @@ def _with_trends(
         return parameter
     values = np.array([interval.value for interval in parameter.values])
     half_widths = np.array([0.5 * (interval.high - interval.low) for interval in parameter.values])
-    # The fit weighs by standard errors, of which an interval spans `wider` to either side.
-    trends = fit_trends(values, half_widths / thresholds.wider, covariates, float(BLOCKS - 1))
+    # The fit weighs by standard errors, of which an interval spans `interval_half_width` to either side.
+    trends = fit_trends(
+        values, half_widths / thresholds.interval_half_width, covariates, float(BLOCKS - 1)
+    )
     rivals, named = name_trends(
-        trends, len(values), thresholds.trend_explains, thresholds.trend_clear
+        trends, len(values), thresholds.trend_share, thresholds.trend_margin
     )
     return replace(parameter, trends=rivals, named=named)

@@ -1,5 +1,5 @@
-"""The first look at a gap: a recording against the twin, replay by replay, or against another
-recording of the same test."""
+"""Comparison of a recording with the twin, replay by replay, or with another recording of the same
+test."""
 
 from __future__ import annotations
 
@@ -29,9 +29,19 @@ NOTHING = 1e-30
 
 @dataclass(frozen=True)
 class Comparison:
-    """What each replay of a recording leaves, by its name, and what could not be replayed and why.
-    gap: rms of all signals less what the twin predicts of them, in units of their white noise; 1 is
-    noise alone."""
+    """Comparison of a recording with the twin.
+
+    Attributes
+    ----------
+    replays
+        Name of the replay → its residual.
+    left_out
+        Name of a replay that is impossible → reason in words.
+    notes
+        Remarks on the recording, one line each.
+    gap
+        rms residual of all signals, in units of their white noise; 1 is noise alone.
+    """
 
     replays: dict[str, Residual]
     left_out: dict[str, str]
@@ -45,28 +55,28 @@ def compare(
     configuration: Configuration | None = None,
     progress: Callable[[str], object] = lambda _: None,
 ) -> Comparison:
-    """A recording against the twin.
+    """Compare a recording with the twin.
 
     Parameters
     ----------
     machine
-        That the recording is of.
+        Machine the recording belongs to.
     recording
-        The data.
+        Recording that is compared.
     configuration
-        Of the twin, see `Machine.configuration_of`; by default that of the description.
+        Configuration of the twin. Defaults to `Machine.configuration_of` the recording.
     progress
-        Called with each replay's name.
+        Called with the name of each replay.
 
     Returns
     -------
     Comparison
-        What each replay leaves, and what could not be replayed.
+        Residual of each replay, and the replays that are impossible.
 
     Raises
     ------
     RigtwinError
-        Naming every fault of the data that makes a comparison meaningless.
+        If the data have faults that forbid a comparison. The message names all of them.
     """
     configuration = configuration or machine.configuration_of(recording)
     faults = require_fit(machine, recording, configuration)
@@ -103,12 +113,12 @@ def _still_signals(evidence: Evidence) -> list[str]:
 
 
 def signal_residuals(evidence: Evidence) -> dict[str, Residual]:
-    """What each signal of the first recording has left.
+    """Return the residual of each signal of the first recording.
 
     Parameters
     ----------
     evidence
-        The recordings, about their nominal plant.
+        Recordings about their nominal plant.
 
     Returns
     -------
@@ -126,17 +136,17 @@ def signal_residuals(evidence: Evidence) -> dict[str, Residual]:
 
 
 def differences(first: Recording, second: Recording) -> tuple[str, ...]:
-    """What was not the same in two tests.
+    """Return the test conditions that differ between two recordings.
 
     Parameters
     ----------
     first, second
-        Their recordings.
+        Recordings of two tests.
 
     Returns
     -------
     tuple of str
-        A line each; empty if they were asked the same.
+        One line for each difference; empty if the conditions are the same.
     """
     notes = []
     if digest(first) == digest(second):
@@ -151,10 +161,10 @@ def differences(first: Recording, second: Recording) -> tuple[str, ...]:
         notes.append(f"different controller settings: {', '.join(unlike)}")
     ticks = min(first.ticks, second.ticks)
     if first.has("/command", "ground") and second.has("/command", "ground"):
-        apart = (
+        deviation = (
             first.column("/command", "ground")[:ticks] - second.column("/command", "ground")[:ticks]
         )
-        if np.max(np.abs(apart)) > 1e-6:
+        if np.max(np.abs(deviation)) > 1e-6:
             notes.append("different ground motions were commanded")
     if str(first.controller.get("mode")) == "mil":
         notes.append(
@@ -167,30 +177,31 @@ def differences(first: Recording, second: Recording) -> tuple[str, ...]:
 def compare_recordings(
     machine: Machine, first: Recording, second: Recording
 ) -> dict[str, Residual]:
-    """Two recordings of one test, sensor by sensor over their common length.
+    """Compare two recordings of one test, sensor by sensor over their common length.
 
     Parameters
     ----------
     machine
-        That both are of.
+        Machine both recordings belong to.
     first, second
-        The recordings.
+        Recordings that are compared.
 
     Returns
     -------
     dict
-        Name of the sensor → its residual, whose floor is both sensors' noise together.
+        Name of the sensor → its residual. The noise floor combines the noise of both recordings.
 
     Raises
     ------
     RigtwinError
-        If one is of another machine, their periods differ, they have too little in common or share
-        no sensor.
+        If a recording belongs to another machine, the periods differ, the common length is too
+        short, or no sensor is in both.
     """
-    for each in (first, second):
-        if each.machine != machine.name:
+    for recording in (first, second):
+        if recording.machine != machine.name:
             raise RigtwinError(
-                f"{each.path}: it is of machine {each.machine!r}; expected {machine.name!r}"
+                f"{recording.path}: it is of machine {recording.machine!r}; "
+                f"expected {machine.name!r}"
             )
     if first.period != second.period:
         raise RigtwinError(
@@ -203,24 +214,25 @@ def compare_recordings(
     results: dict[str, Residual] = {}
     still: list[str] = []
     sensors = [
-        each
-        for each in machine.components.values()
-        if each.channel is not None and each.element == "sensor"
+        component
+        for component in machine.components.values()
+        if component.channel is not None and component.element == "sensor"
     ]
     for sensor in sensors:
         topic, name = sensor.channel or ("", "")
         if first.has(topic, name) and second.has(topic, name):
-            one, other = first.column(topic, name)[:ticks], second.column(topic, name)[:ticks]
-            if not (np.isfinite(one).all() and np.isfinite(other).all()):
+            before, after = first.column(topic, name)[:ticks], second.column(topic, name)[:ticks]
+            if not (np.isfinite(before).all() and np.isfinite(after).all()):
                 raise RigtwinError(
                     f"{topic}.{name} is not a number somewhere in {first.path} or {second.path}"
                 )
-            difference = remove_mains(one - other, first.period, machine.plant.mains.frequency)
-            if np.ptp(one) == 0.0 and np.ptp(other) == 0.0:
+            difference = remove_mains(before - after, first.period, machine.plant.mains.frequency)
+            if np.ptp(before) == 0.0 and np.ptp(after) == 0.0:
                 still.append(sensor.name)
             results[sensor.name] = compute_residual(
                 difference,
-                math.hypot(white_noise(one), white_noise(other)),
+                # Independent noises of two recordings add in power.
+                math.hypot(white_noise(before), white_noise(after)),
                 sensor.unit,
                 first.period,
             )

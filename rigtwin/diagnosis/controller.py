@@ -1,5 +1,9 @@
-"""Does a controller do what it was told? Its commands are worked out again from what was
-recorded."""
+"""Deviations of a controller from its settings, found by replaying it on the recorded inputs.
+
+A controller is deterministic: with the recorded inputs and the operator's settings it gives the
+recorded commands up to rounding. Where it does not, missed ticks, delayed samples and another value
+of a single setting are tried in turn.
+"""
 
 from __future__ import annotations
 
@@ -20,32 +24,45 @@ from rigtwin.recording import Recording
 from rigtwin.signals.noise import rms
 
 EXACT = 20.0
-"""Times a command's rounding within which its replay counts as exact: a controller's own arithmetic
-rounds too."""
+"""Error of a replay that counts as exact, in units of a command's rounding. The controller's own
+arithmetic rounds too."""
 CLOSER = 0.3
-"""Share of what is left that another value must leave at most to be the explanation, of a
-controller described inexactly."""
+"""Largest share of the misfit that another value of a setting may leave to explain the commands of
+a controller that is described inexactly."""
 NEARLY = 0.1
-"""Share of how far commands move by which those of another value may differ at most."""
-RAN_AWAY = 1e100
-"""Commands from which a replay is off by that much and no more; whoever looks for the least needs a
-number."""
+"""Largest error of the commands with another value of a setting, as a share of their motion."""
+DIVERGED = 1e100
+"""Misfit of a replay that diverges. It is finite, as the minimisation needs numbers."""
 LATE = 4
-"""Ticks by which the commands may lag behind, at most, to be recognised."""
+"""Longest delay of the samples that is recognised, in ticks."""
 REPEATED = 0.2
-"""Share of ticks that repeat all commands, above which they are not missed but constant."""
+"""Share of ticks that repeat all commands above which the commands are constant, and no ticks were
+missed."""
 SETTLED = 5
-"""Ticks after which what remembers the past has forgotten how it began."""
-AWAY = np.array([-2.0, -1.0, -0.75, -0.5, -0.25, -0.05, 0.05, 0.25, 0.5, 1.0, 2.0, 4.0])
-"""In sizes of a setting, where another value is looked for first."""
+"""Ticks after which the controller's states have forgotten their unknown start."""
+GRID = np.array([-2.0, -1.0, -0.75, -0.5, -0.25, -0.05, 0.05, 0.25, 0.5, 1.0, 2.0, 4.0])
+"""Differences from a setting at which other values are tried first, in units of its size."""
 
 
 @dataclass(frozen=True)
 class Deviation:
-    """What a controller did other than told. kind: `setting`, `missed_ticks` or `delay`, or
-    `unknown` if nothing reproduces its commands; name: of the setting, or of the parameter; told:
-    the operator's value; used: the one that reproduces them; consequence: by how much of itself
-    the command that changes most does."""
+    """Deviation of a controller from its settings.
+
+    Attributes
+    ----------
+    kind
+        `setting`, `missed_ticks` or `delay`; `unknown` if nothing reproduces the commands.
+    name
+        Name of the setting or of the parameter.
+    told
+        Value set by the operator, in `unit`.
+    used
+        Value that reproduces the commands, in `unit`.
+    unit
+        Unit of both values.
+    consequence
+        Change of the most affected command, as a share of its motion.
+    """
 
     kind: str
     name: str
@@ -56,10 +73,25 @@ class Deviation:
 
 
 class ControllerReplay:
-    """The commands that some settings give for what was recorded, beside those that were."""
+    """Replay of a controller on the recorded inputs, compared with the recorded commands."""
 
     def __init__(self, control: Control, recording: Recording, settings: Any) -> None:
-        """settings: as told, a NamedTuple. Raises RigtwinError if a channel is missing."""
+        """Read the inputs and commands of a recording.
+
+        Parameters
+        ----------
+        control
+            Described controller.
+        recording
+            Recording with the controller's channels.
+        settings
+            The operator's settings, a NamedTuple.
+
+        Raises
+        ------
+        RigtwinError
+            If a channel is missing.
+        """
         self._control, self._settings, self._period = control, settings, recording.period
         self.recorded = np.stack([recording.column("/command", name) for name in control.outputs])
         self._inputs = [recording.column(*channel) for channel in control.channels]
@@ -72,61 +104,95 @@ class ControllerReplay:
     def commands(
         self, settings: Any, skipped: NDArray[np.bool_] | None = None, late: int = 0
     ) -> Array:
-        """Commands at every tick, shape (outputs, ticks). skipped: ticks at which the controller
-        does not run and its outputs stay; late: ticks that its samples are old."""
+        """Return the commands at every tick.
+
+        Parameters
+        ----------
+        settings
+            Settings of the controller.
+        skipped
+            Ticks at which the controller does not run and its outputs are held, shape (ticks,).
+        late
+            Delay of the samples, in ticks.
+
+        Returns
+        -------
+        array
+            Commands, shape (outputs, ticks).
+        """
         inputs = self._inputs
         if late:
-            # What was demanded is no sample.
-            own = [("/command", name) for name in self._control.outputs]
+            # Demands are no samples and are not delayed.
+            outputs = [("/command", name) for name in self._control.outputs]
             inputs = [
                 column
-                if channel in own
+                if channel in outputs
                 else np.concatenate([np.full(late, column[0]), column[:-late]])
                 for column, channel in zip(inputs, self._control.channels, strict=True)
             ]
         if skipped is None:
             return self._control.replay(settings, inputs, self._period)
         runs = np.nonzero(~skipped)[0]
-        own = self._control.replay(settings, [column[runs] for column in inputs], self._period)
+        executed = self._control.replay(settings, [column[runs] for column in inputs], self._period)
+        # Each tick shows the outputs of the last executed tick; before the first one they are 0.
         last = np.searchsorted(runs, np.arange(len(skipped)), side="right") - 1
-        return np.where(last >= 0, own[:, np.maximum(last, 0)], 0.0)
+        return np.where(last >= 0, executed[:, np.maximum(last, 0)], 0.0)
 
     def misfit(self, commands: Array, counted: NDArray[np.bool_] | None = None) -> float:
-        """rms of what commands differ by, in units of what counts as exact; of the worst
-        command."""
+        """Return the rms error of the worst command, in units of the error that counts as exact.
+
+        Parameters
+        ----------
+        commands
+            Replayed commands, shape (outputs, ticks).
+        counted
+            Ticks that are compared, shape (ticks,). Defaults to all of them.
+
+        Returns
+        -------
+        float
+            Misfit; at most 1 for an exact replay, `DIVERGED` where the replay is not finite.
+        """
         difference = (commands - self.recorded)[:, SETTLED:]
         if counted is not None:
             difference = difference[:, counted[SETTLED:]]
-        if not np.max(np.abs(difference), initial=0.0) < RAN_AWAY:
-            return RAN_AWAY
+        # The negated comparison also catches NaN.
+        if not np.max(np.abs(difference), initial=0.0) < DIVERGED:
+            return DIVERGED
         return max(rms(row) / exact for row, exact in zip(difference, self._exact, strict=True))
 
     def deviation(self) -> Deviation | None:
-        """What explains that the commands are not those of the settings; None if they are."""
+        """Return the deviation that explains the commands; None if the settings reproduce them."""
         commands = self.commands(self._settings)
-        left = self.misfit(commands)
-        if left <= 1.0:
+        misfit = self.misfit(commands)
+        if misfit <= 1.0:
             return None
-        found = (
+        # Missed ticks and delays have an exact signature and are tested first. Another value of a
+        # setting might imitate them approximately.
+        deviation = (
             self._find_missed_ticks()
             or self._find_delay()
-            or self._find_setting(left)
+            or self._find_setting(misfit)
             or Deviation("unknown", "", 0.0, 0.0, "1")
         )
-        return replace(found, consequence=self._consequence(commands))
+        return replace(deviation, consequence=self._consequence(commands))
 
     def _consequence(self, commands: Array) -> float:
-        """rms of what commands differ by, as a share of how far they move; of the worst."""
+        """Return the rms error of the worst command, as a share of its standard deviation."""
         differs = np.sqrt(np.mean((commands - self.recorded)[:, SETTLED:] ** 2, axis=1))
         moves = np.std(self.recorded[:, SETTLED:], axis=1)
         shares = [
-            (one / other if other > 0.0 else math.inf)
-            for one, other in zip(differs.tolist(), moves.tolist(), strict=True)
-            if one > 0.0
+            (error / motion if motion > 0.0 else math.inf)
+            for error, motion in zip(differs.tolist(), moves.tolist(), strict=True)
+            if error > 0.0
         ]
         return max(shares, default=0.0)
 
     def _find_missed_ticks(self) -> Deviation | None:
+        """Return missed ticks: some ticks repeat all commands, and the others are exact.
+
+        The controller may have run during the missed ticks, or not; both are tried.
+        """
         repeated = np.concatenate([[False], np.all(np.diff(self.recorded, axis=1) == 0.0, axis=0)])
         if not 0 < repeated.sum() < REPEATED * len(repeated):
             return None
@@ -137,17 +203,18 @@ class ControllerReplay:
         return Deviation("missed_ticks", "missed_ticks", 0.0, float(repeated.mean()), "1")
 
     def _find_delay(self) -> Deviation | None:
+        """Return the delay of the samples that makes the replay exact."""
         for late in range(1, LATE + 1):
             if self.misfit(self.commands(self._settings, late=late)) <= 1.0:
                 return Deviation("delay", "delay", 0.0, late * self._period, "s")
         return None
 
-    def _find_setting(self, left: float) -> Deviation | None:
-        """The one setting that, at another value, reproduces the commands."""
-        found: list[tuple[float, Deviation]] = []
+    def _find_setting(self, nominal_misfit: float) -> Deviation | None:
+        """Return the single setting that reproduces the commands at another value."""
+        trials: list[tuple[float, Deviation]] = []
         for name, meaning in fields(type(self._settings)).items():
-            told = float(getattr(self._settings, name))
-            if name == "mode" or (told == 0.0 and self._control.exact is not None):
+            nominal = float(getattr(self._settings, name))
+            if name == "mode" or (nominal == 0.0 and self._control.exact is not None):
                 continue
 
             def misfit(value: Any, name: str = name) -> float:
@@ -155,51 +222,55 @@ class ControllerReplay:
                 try:
                     commands = self.commands(settings)
                 except RigtwinError:
-                    # Of such settings no controller can be made.
-                    return RAN_AWAY
+                    # Settings from which no controller can be made reproduce nothing.
+                    return DIVERGED
                 return self.misfit(commands)
 
             if isinstance(meaning, Quantity):
-                best, value = _minimise(misfit, told, meaning)
-                found.append((best, Deviation("setting", name, told, value, meaning.unit)))
+                best, value = _minimise(misfit, nominal, meaning)
+                trials.append((best, Deviation("setting", name, nominal, value, meaning.unit)))
             else:
                 best, value = min((misfit(choice), float(choice)) for choice in meaning)
-                found.append((best, Deviation("setting", name, told, value, "1")))
-        enough = 1.0 if self._control.exact is None else max(1.0, CLOSER * left)
+                trials.append((best, Deviation("setting", name, nominal, value, "1")))
+        enough = 1.0 if self._control.exact is None else max(1.0, CLOSER * nominal_misfit)
         return min(
-            (each for each in found if each[0] <= enough and self._reproduces(each[1])),
-            key=lambda each: each[0],
+            (trial for trial in trials if trial[0] <= enough and self._reproduces(trial[1])),
+            key=lambda trial: trial[0],
             default=(0.0, None),
         )[1]
 
-    def _reproduces(self, found: Deviation) -> bool:
-        """Whether commands with another setting are nearly those recorded, and not merely smaller
-        than those with the told one."""
+    def _reproduces(self, deviation: Deviation) -> bool:
+        """Return whether a deviating setting gives nearly the recorded commands.
+
+        A lower misfit alone does not suffice: any setting that reduces the commands may lower it.
+        """
         if self._control.exact is None:
             return True
-        settings = self._settings._replace(**{found.name: found.used})
+        settings = self._settings._replace(**{deviation.name: deviation.used})
         return self._consequence(self.commands(settings)) < NEARLY
 
 
 def _minimise(
-    misfit: Callable[[float], float], told: float, meaning: Quantity
+    misfit: Callable[[float], float], nominal: float, meaning: Quantity
 ) -> tuple[float, float]:
-    """Smallest misfit over one setting, and where: a coarse look around the told value, then a
-    bounded search."""
-    from scipy.optimize import minimize_scalar  # Late: it takes its time.
+    """Return the smallest misfit over one setting, and its value.
 
-    size = max(abs(told), 0.01 * min(meaning.high, 1.0))
-    # Some settings matter only relative to nothing (a skyhook that is off), so the grid is wide.
-    grid = np.unique(np.clip(told + size * AWAY, meaning.low, meaning.high))
+    A coarse grid about the nominal value is followed by a bounded search between its neighbours.
+    """
+    from scipy.optimize import minimize_scalar  # Imported here, as it loads slowly.
+
+    size = max(abs(nominal), 0.01 * min(meaning.high, 1.0))
+    # A setting may be 0, as the gain of a skyhook that is off, so that the grid is wide.
+    grid = np.unique(np.clip(nominal + size * GRID, meaning.low, meaning.high))
     ends = misfit(grid[0]), misfit(grid[-1])
     if len(grid) == 1 or ends[0] == ends[1] == misfit(grid[len(grid) // 2]):
-        # It changes nothing: a part of the controller that is off.
-        return ends[0], told
+        # The setting has no effect: it belongs to a part of the controller that is off.
+        return ends[0], nominal
     values = [ends[0], *(misfit(value) for value in grid[1:-1]), ends[1]]
     place = int(np.argmin(values))
-    near = np.append(grid, told)
+    near = np.append(grid, nominal)
     low = near[near < grid[place]].max(initial=meaning.low)
     high = near[near > grid[place]].min(initial=meaning.high)
     options = {"xatol": 1e-9 * size, "maxiter": 80}
-    found = minimize_scalar(misfit, bounds=(low, high), method="bounded", options=options)
-    return min((float(found.fun), float(found.x)), (values[place], float(grid[place])))
+    minimum = minimize_scalar(misfit, bounds=(low, high), method="bounded", options=options)
+    return min((float(minimum.fun), float(minimum.x)), (values[place], float(grid[place])))

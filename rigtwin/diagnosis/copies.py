@@ -1,4 +1,8 @@
-"""Recordings with the same content: a copy adds nothing to a fit, and is no held-out data."""
+"""Recordings with the same content.
+
+A copy among the fitted recordings would count the same noise twice and make every result look more
+certain. A copy among the held-out recordings would judge a correction by the data of its fit.
+"""
 
 from __future__ import annotations
 
@@ -17,14 +21,15 @@ def digest(recording: Recording) -> str:
     Parameters
     ----------
     recording
-        The recording.
+        Recording whose columns are read.
 
     Returns
     -------
     str
-        The same for two recordings of the same data, whatever their names and times.
+        SHA-256 digest. It is independent of the file's name and date.
     """
     content = hashlib.sha256()
+    # Topics and columns are sorted, as a copy may list them in another order.
     for topic, columns in sorted(recording.columns.items()):
         for name, values in sorted(columns.items()):
             content.update(f"{topic}.{name}".encode())
@@ -38,22 +43,22 @@ def drop_copies(recordings: Sequence[Recording]) -> tuple[list[Recording], list[
     Parameters
     ----------
     recordings
-        Recordings that are explained together.
+        Recordings fitted jointly.
 
     Returns
     -------
     tuple
-        The recordings without copies, in their order, and a note for each copy.
+        Recordings without copies, in their order, and a note for each copy.
     """
-    kept: dict[str, Recording] = {}
+    distinct: dict[str, Recording] = {}
     notes = []
     for recording in recordings:
-        first = kept.setdefault(digest(recording), recording)
+        first = distinct.setdefault(digest(recording), recording)
         if first is not recording:
             notes.append(
                 f"{recording.path.name} holds the same data as {first.path.name}; left out"
             )
-    return list(kept.values()), notes
+    return list(distinct.values()), notes
 
 
 def refuse_copies(held_out: Sequence[Recording], fitted: Sequence[Recording]) -> None:
@@ -62,20 +67,20 @@ def refuse_copies(held_out: Sequence[Recording], fitted: Sequence[Recording]) ->
     Parameters
     ----------
     held_out
-        Recordings that a correction is judged on.
+        Recordings that judge a correction.
     fitted
-        Recordings that it is fitted to.
+        Recordings that the correction is fitted to.
 
     Raises
     ------
     RigtwinError
-        If one of them has the same content as one of the fit.
+        If a held-out recording has the same content as a fitted one.
     """
-    known = {digest(recording): recording for recording in fitted}
+    by_digest = {digest(recording): recording for recording in fitted}
     for recording in held_out:
-        same = known.get(digest(recording))
-        if same is not None:
+        copied = by_digest.get(digest(recording))
+        if copied is not None:
             raise RigtwinError(
                 f"{recording.path} cannot judge the correction: it holds the same data as "
-                f"{same.path}, which is fitted; expected a recording of another test"
+                f"{copied.path}, which is fitted; expected a recording of another test"
             )

@@ -1,4 +1,18 @@
-"""How far a correction shrinks the gap, on data that it was not fitted to."""
+"""Cross-validation of a correction: how far it shrinks the gap on data it was not fitted to.
+
+The power of the residual is the mean over signals of ((y - p) / s)^2, where y is measured, p
+predicted and s the signal's white noise. Noise and declared model error alone have the floor
+
+    1 + (f std(y) / s)^2
+
+with f the declared share. The shrinkage of a correction is the share of the gap's amplitude above
+that floor which it closes:
+
+    1 - sqrt(after - floor) / sqrt(before - floor).
+
+Its interval is a block bootstrap: the residual is correlated in time, so that whole blocks and not
+single ticks are drawn anew [Carlstein, Ann. Stat. 14 (1986) 1171].
+"""
 
 from __future__ import annotations
 
@@ -13,14 +27,14 @@ from rigtwin.components.plant import Plant
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.finding import Interval
 from rigtwin.diagnosis.fit import Fit, with_values
-from rigtwin.diagnosis.posterior import Posterior
+from rigtwin.diagnosis.posterior import HypothesisPosterior
 from rigtwin.diagnosis.thresholds import STANDARD, Thresholds
 from rigtwin.numerics.arrays import Array
 
 BLOCK = 0.5
-"""s, length of a block of the bootstrap: what a test leaves is correlated within it."""
+"""Length of a block of the bootstrap, s. The residual of a test is correlated within it."""
 DRAWS = 1000
-"""Draws of the bootstrap."""
+"""Number of draws of the bootstrap."""
 GAP = 1.5
 """Ratio of a signal's power to that of noise and declared error from which it has a gap."""
 SEED = 20
@@ -32,12 +46,12 @@ Effects = tuple[Effect, ...]
 class Blocks:
     """Power of the residual in blocks of time, in units of the sensors' white noise.
 
-    Parameters
+    Attributes
     ----------
     before, after
-        With the nominal and with the corrected plant, shape (blocks,).
+        Power with the nominal and with the corrected plant, shape (blocks,).
     floor
-        Power that noise and the declared model error have.
+        Power of noise and declared model error.
     """
 
     before: Array
@@ -46,35 +60,69 @@ class Blocks:
 
 
 def power(evidence: Evidence, plant: Plant) -> list[Array]:
-    """Mean power over the sensors at every tick, in units of their white noise's, shape (ticks,)
-    for each recording."""
-    found = []
+    """Return the power of the residual at every tick, averaged over the signals.
+
+    Parameters
+    ----------
+    evidence
+        Recordings that are predicted.
+    plant
+        Plant whose predictions are compared.
+
+    Returns
+    -------
+    list of arrays
+        Power in units of the sensors' white noise, shape (ticks,) for each recording.
+    """
+    powers = []
     for lines, predicted in zip(evidence.lines, evidence.predict(plant), strict=True):
         with np.errstate(over="ignore"):
             relative = (lines.measured - predicted) / lines.noise[:, None]
-            found.append(np.mean(relative**2, axis=0))
-    return found
+            powers.append(np.mean(relative**2, axis=0))
+    return powers
 
 
 def gap_level(evidence: Evidence, plant: Plant) -> float:
-    """rms of all signals less what a plant predicts, in units of their white noise, where a test
-    counts."""
+    """Return the gap: the rms residual of all signals in units of their white noise.
+
+    Parameters
+    ----------
+    evidence
+        Recordings that are predicted.
+    plant
+        Plant whose predictions are compared.
+
+    Returns
+    -------
+    float
+        Gap over the ticks with at least half the full weight; 1 is noise alone.
+    """
     powers = [
-        each[lines.fade.max(axis=0) > 0.5]
-        for each, lines in zip(power(evidence, plant), evidence.lines, strict=True)
+        ticks[lines.fade.max(axis=0) > 0.5]
+        for ticks, lines in zip(power(evidence, plant), evidence.lines, strict=True)
     ]
-    ticks = sum(len(each) for each in powers)
-    return math.sqrt(sum(float(each.sum()) for each in powers) / max(ticks, 1))
+    count = sum(len(part) for part in powers)
+    return math.sqrt(sum(float(part.sum()) for part in powers) / max(count, 1))
 
 
 def declared_floor(evidence: Evidence) -> float:
-    """Power of noise and declared model error, in units of the sensors' white noise."""
+    """Return the power of noise and declared model error, in units of the white noise's power."""
     return float(np.mean(signal_floors(evidence)))
 
 
 def signal_floors(evidence: Evidence) -> Array:
-    """Power of noise and declared model error of each signal, in units of its white noise, shape
-    (recordings, signals)."""
+    """Return the power of noise and declared model error of each signal.
+
+    Parameters
+    ----------
+    evidence
+        Recordings with their noise.
+
+    Returns
+    -------
+    array
+        Power in units of each signal's white noise, shape (recordings, signals).
+    """
     forms = np.array([evidence.machine.form_of(row) for row in evidence.machine.rows])
     return np.stack(
         [
@@ -87,22 +135,22 @@ def signal_floors(evidence: Evidence) -> Array:
 def largest_shrinkage(
     evidence: Evidence, before: Plant, after: Plant, optimism: float = 1.0
 ) -> float:
-    """Share of the gap that a correction closes in the signal where it closes most.
+    """Return the share of the gap that a correction closes in the signal where it closes most.
 
     Parameters
     ----------
     evidence
-        The recordings.
+        Recordings that are predicted.
     before, after
-        The nominal and the corrected plant.
+        Nominal and corrected plant.
     optimism
-        Factor by which a fit's residual has more power on data left out than on its own; 1 if the
-        recordings are not those of the fit.
+        Ratio of the residual's power on held-out data to that on the data of the fit. Defaults to
+        1, for recordings that were not fitted.
 
     Returns
     -------
     float
-        At most 1; signals without a gap before do not count.
+        Shrinkage, at most 1. Signals without a gap before the correction do not count.
     """
     powers, floors = np.zeros((2, len(evidence.names))), np.zeros(len(evidence.names))
     for lines, floor, *predictions in zip(
@@ -113,6 +161,7 @@ def largest_shrinkage(
         strict=True,
     ):
         counted = lines.fade.max(axis=0) > 0.5
+        # Longer recordings count by their number of ticks, in the floor as in the powers.
         floors += np.count_nonzero(counted) * floor
         for number, predicted in enumerate(predictions):
             relative = (lines.measured - predicted)[:, counted] / lines.noise[:, None]
@@ -120,18 +169,32 @@ def largest_shrinkage(
     powers[1] *= optimism
     return max(
         (
-            shrinkage(float(one), float(other), float(least))
-            for one, other, least in zip(*powers, floors, strict=True)
-            if one > GAP * least
+            shrinkage(float(nominal), float(corrected), float(floor))
+            for nominal, corrected, floor in zip(*powers, floors, strict=True)
+            if nominal > GAP * floor
         ),
         default=0.0,
     )
 
 
 def blocks(evidence: Evidence, before: Plant, after: Plant) -> Blocks:
-    """Cut the residuals of two plants into blocks."""
-    pairs: tuple[list[float], list[float]] = ([], [])
-    for recording, lines, one, other in zip(
+    """Cut the residuals of two plants into blocks of time.
+
+    Parameters
+    ----------
+    evidence
+        Recordings that are predicted.
+    before, after
+        Nominal and corrected plant.
+
+    Returns
+    -------
+    Blocks
+        Mean power of each block in which all ticks have at least half the full weight.
+    """
+    nominal_means: list[float] = []
+    corrected_means: list[float] = []
+    for recording, lines, nominal, corrected in zip(
         evidence.recordings,
         evidence.lines,
         power(evidence, before),
@@ -139,72 +202,87 @@ def blocks(evidence: Evidence, before: Plant, after: Plant) -> Blocks:
         strict=True,
     ):
         length = max(1, round(BLOCK / lines.period))
+        # A short recording still gives several blocks to draw from.
         length = min(length, max(recording.ticks // 4, 1))
         counted = lines.fade.max(axis=0) > 0.5
-        for start in range(0, len(one) - length + 1, length):
+        for start in range(0, len(nominal) - length + 1, length):
             if counted[start : start + length].all():
-                pairs[0].append(float(np.mean(one[start : start + length])))
-                pairs[1].append(float(np.mean(other[start : start + length])))
-    return Blocks(np.array(pairs[0]), np.array(pairs[1]), declared_floor(evidence))
+                nominal_means.append(float(np.mean(nominal[start : start + length])))
+                corrected_means.append(float(np.mean(corrected[start : start + length])))
+    return Blocks(np.array(nominal_means), np.array(corrected_means), declared_floor(evidence))
 
 
 def shrinkage(before: float, after: float, floor: float = 1.0) -> float:
-    """Share of the rms gap above the floor that is closed; negative if it grows.
+    """Return the share of the rms gap above the floor that is closed.
 
     Parameters
     ----------
     before, after
-        Mean powers in units of the noise's.
+        Mean powers in units of the noise's power.
     floor
         Power of noise and declared error.
+
+    Returns
+    -------
+    float
+        At most 1; negative if the gap grows.
     """
     gap = math.sqrt(max(before - floor, 0.0))
-    left = math.sqrt(max(after - floor, 0.0))
-    return 1.0 - left / gap if gap > 0.0 else 0.0
+    remainder = math.sqrt(max(after - floor, 0.0))
+    return 1.0 - remainder / gap if gap > 0.0 else 0.0
 
 
-def interval(of: Blocks) -> Interval:
-    """The shrinkage over blocks, with its 95 % interval by drawing blocks anew."""
-    if not len(of.before):
+def interval(residual: Blocks) -> Interval:
+    """Return the shrinkage over all blocks with its 95 % bootstrap interval.
+
+    Parameters
+    ----------
+    residual
+        Power of the residual in blocks of time.
+
+    Returns
+    -------
+    Interval
+        Shrinkage with its interval; zeros if there is no block.
+    """
+    count = len(residual.before)
+    if not count:
         return Interval(0.0, 0.0, 0.0)
+    # The seed is fixed: the same recordings give the same answer.
     random = np.random.default_rng(SEED)
-    drawn = random.integers(0, len(of.before), (DRAWS, len(of.before)))
-    before, after = of.before[drawn].mean(axis=1), of.after[drawn].mean(axis=1)
-    values = [shrinkage(b, a, of.floor) for b, a in zip(before, after, strict=True)]
+    drawn = random.integers(0, count, (DRAWS, count))
+    before, after = residual.before[drawn].mean(axis=1), residual.after[drawn].mean(axis=1)
+    values = [shrinkage(b, a, residual.floor) for b, a in zip(before, after, strict=True)]
     low, high = np.quantile(values, [0.025, 0.975])
-    return Interval(
-        shrinkage(float(of.before.mean()), float(of.after.mean()), of.floor),
-        float(low),
-        float(high),
-    )
+    return Interval(_shrinkage_of(residual), float(low), float(high))
 
 
 @dataclass(frozen=True)
 class Validation:
-    """What a correction does on data held out of its fit.
+    """Effect of a correction on data held out of its fit.
 
-    Parameters
+    Attributes
     ----------
     predicted
-        Share of the gap that it closes on the data of the fit.
+        Share of the gap that the correction closes on the data of the fit.
     held_out
-        Share that it closes on data held out of the fit.
-    kept
+        Share that it closes on held-out data.
+    accepted
         Effects that do not make held-out data worse.
     rejected
-        Effects that do.
+        Effects that make held-out data worse.
     data
-        What was held out, in words.
+        Description of the held-out data.
     largest
-        Share that the kept effects close in the signal where they close most.
+        Share that the accepted effects close in the signal where they close most.
     measurable
-        Whether the whole gap exceeds noise and declared error before the correction. One that
-        stands in few frequencies may not, and be clear there all the same.
+        Whether the power over all signals exceeds noise and declared error before the correction.
+        A gap within a narrow band may not raise it, and yet be significant in that band.
     """
 
     predicted: float
     held_out: Interval
-    kept: Effects
+    accepted: Effects
     rejected: Effects
     data: str
     largest: float
@@ -215,88 +293,137 @@ def validate(
     evidence: Evidence,
     fit: Fit,
     named: Effects,
-    posterior: Posterior,
-    other: Evidence | None = None,
+    posterior: HypothesisPosterior,
+    held_out: Evidence | None = None,
     thresholds: Thresholds = STANDARD,
 ) -> Validation:
-    """Judge a fit on data held out of it.
+    """Judge a correction on data held out of its fit.
 
     Parameters
     ----------
     evidence
-        Evidence that it was fitted to.
+        Evidence of the fit.
     fit
-        The best hypothesis.
+        Best hypothesis.
     named
-        Effects of it that are named.
+        Effects of the fit that are named.
     posterior
-        Its cross-validation, used where no other data are given.
-    other
-        Evidence of recordings held out of the fit.
+        Cross-validation of the fit, used where there are no held-out recordings.
+    held_out
+        Evidence of recordings held out of the fit. Defaults to the blocks held out in turn.
     thresholds
-        Numbers that it goes by.
+        Thresholds of the diagnosis.
 
     Returns
     -------
     Validation
-        How far the gap shrinks, and which effects stay.
+        Shrinkage of the gap, and the effects that are accepted and rejected.
     """
-    inside = blocks(evidence, evidence.plant, with_effects(evidence.plant, fit, named))
-    predicted = _shrinkage_of(inside)
-    if other is None:
-        best = posterior.best
-        out, own = (float(np.sum(each * best.samples)) for each in (best.levels, best.inside))
-        optimism = max(out / max(own, 1e-300), 1.0)
-        after = inside.after * optimism
-        closed = interval(Blocks(inside.before, after, inside.floor))
-        largest = largest_shrinkage(
-            evidence, evidence.plant, with_effects(evidence.plant, fit, named), optimism
-        )
-        return Validation(
-            predicted,
-            closed,
-            named,
-            (),
-            "blocks left out of the fit in turn",
-            largest,
-            _is_measurable(inside),
-        )
+    corrected = with_effects(evidence.plant, fit, named)
+    inside = blocks(evidence, evidence.plant, corrected)
+    if held_out is None:
+        return _validate_on_blocks(evidence, corrected, inside, named, posterior)
+    return _validate_on_recordings(evidence, fit, inside, named, held_out, thresholds)
 
-    def across(kept: Effects) -> Blocks:
-        return blocks(other, evidence.plant, with_effects(evidence.plant, fit, kept))
 
-    count = len(other.recordings)
-    data = f"{count} held-out recording{'s' if count > 1 else ''}"
-    kept, rejected = reject_worsening(named, across, thresholds.worse)
-    largest = largest_shrinkage(other, evidence.plant, with_effects(evidence.plant, fit, kept))
-    outside = across(kept)
+def _validate_on_blocks(
+    evidence: Evidence,
+    corrected: Plant,
+    inside: Blocks,
+    named: Effects,
+    posterior: HypothesisPosterior,
+) -> Validation:
+    """Judge a correction on the blocks that were held out of its fit in turn.
+
+    The residual of the fit is scaled by its optimism: the ratio of the held-out power of the best
+    hypothesis to its fitted power. No effect is rejected, as the search has judged it by the same
+    blocks.
+    """
+    best = posterior.best
+    outside, fitted = (float(np.sum(part * best.samples)) for part in (best.levels, best.inside))
+    optimism = max(outside / max(fitted, 1e-300), 1.0)
+    scaled = Blocks(inside.before, inside.after * optimism, inside.floor)
     return Validation(
-        predicted, interval(outside), kept, rejected, data, largest, _is_measurable(outside)
+        predicted=_shrinkage_of(inside),
+        held_out=interval(scaled),
+        accepted=named,
+        rejected=(),
+        data="blocks left out of the fit in turn",
+        largest=largest_shrinkage(evidence, evidence.plant, corrected, optimism),
+        measurable=_is_measurable(inside),
     )
 
 
-def _is_measurable(of: Blocks) -> bool:
-    return bool(len(of.before)) and float(of.before.mean()) > of.floor
+def _validate_on_recordings(
+    evidence: Evidence,
+    fit: Fit,
+    inside: Blocks,
+    named: Effects,
+    held_out: Evidence,
+    thresholds: Thresholds,
+) -> Validation:
+    """Judge a correction on held-out recordings, and reject the effects that make them worse."""
+
+    def correct_with(effects: Effects) -> Blocks:
+        return blocks(held_out, evidence.plant, with_effects(evidence.plant, fit, effects))
+
+    count = len(held_out.recordings)
+    accepted, rejected = reject_worsening(named, correct_with, thresholds.worsening_factor)
+    corrected = with_effects(evidence.plant, fit, accepted)
+    outside = correct_with(accepted)
+    return Validation(
+        predicted=_shrinkage_of(inside),
+        held_out=interval(outside),
+        accepted=accepted,
+        rejected=rejected,
+        data=f"{count} held-out recording{'s' if count > 1 else ''}",
+        largest=largest_shrinkage(held_out, evidence.plant, corrected),
+        measurable=_is_measurable(outside),
+    )
 
 
-def _shrinkage_of(of: Blocks) -> float:
-    if not len(of.before):
+def _is_measurable(residual: Blocks) -> bool:
+    """Return whether the power before the correction exceeds noise and declared error."""
+    return bool(len(residual.before)) and float(residual.before.mean()) > residual.floor
+
+
+def _shrinkage_of(residual: Blocks) -> float:
+    """Return the shrinkage over all blocks; 0 if there is none."""
+    if not len(residual.before):
         return 0.0
-    return shrinkage(float(of.before.mean()), float(of.after.mean()), of.floor)
+    before, after = float(residual.before.mean()), float(residual.after.mean())
+    return shrinkage(before, after, residual.floor)
 
 
-def with_effects(plant: Plant, fit: Fit, kept: Sequence[Effect]) -> Plant:
-    """The plant with those of a fit's effects that are kept."""
+def with_effects(plant: Plant, fit: Fit, accepted: Sequence[Effect]) -> Plant:
+    """Set the accepted effects of a fit in a plant.
+
+    Parameters
+    ----------
+    plant
+        Plant without the effects.
+    fit
+        Fit with the effects' values.
+    accepted
+        Effects to set. Effects that are not part of the fit are ignored.
+
+    Returns
+    -------
+    Plant
+        The plant with these effects.
+    """
     pairs = [
         (effect, values)
         for effect, values in zip(fit.effects, fit.values, strict=True)
-        if effect in kept
+        if effect in accepted
     ]
     return with_values(plant, [effect for effect, _ in pairs], [values for _, values in pairs])
 
 
 def reject_worsening(
-    effects: Effects, across: Callable[[Effects], Blocks], worse: float = STANDARD.worse
+    effects: Effects,
+    correct_with: Callable[[Effects], Blocks],
+    factor: float = STANDARD.worsening_factor,
 ) -> tuple[Effects, Effects]:
     """Reject effects that make held-out data worse.
 
@@ -304,27 +431,29 @@ def reject_worsening(
     ----------
     effects
         Effects of a correction.
-    across
-        Residual of held-out data with some of the effects.
-    worse
-        Factor of the residual's power from which an effect is rejected.
+    correct_with
+        Function that returns the residual of held-out data corrected with some of the effects.
+    factor
+        Factor of the residual's power above which an effect is rejected.
 
     Returns
     -------
     tuple
-        Effects that are kept, and those that are rejected.
+        Accepted and rejected effects.
     """
-    kept = effects
-    while kept:
-        left = across(kept)
-        if not len(left.after):
+    accepted = effects
+    while accepted:
+        corrected = correct_with(accepted)
+        if not len(corrected.after):
             break
-        # One that is far off spoils the others' standing: the worst goes first.
+        # One effect is rejected at a time, the worst first: a wrong effect may make others that are
+        # right look harmful beside it.
         without = {
-            effect: across(tuple(other for other in kept if other != effect)) for effect in kept
+            effect: correct_with(tuple(member for member in accepted if member != effect))
+            for effect in accepted
         }
-        worst = min(kept, key=lambda effect: float(without[effect].after.mean()))
-        if float(left.after.mean()) <= worse * float(without[worst].after.mean()):
+        worst = min(accepted, key=lambda effect: float(without[effect].after.mean()))
+        if float(corrected.after.mean()) <= factor * float(without[worst].after.mean()):
             break
-        kept = tuple(other for other in kept if other != worst)
-    return kept, tuple(effect for effect in effects if effect not in kept)
+        accepted = tuple(member for member in accepted if member != worst)
+    return accepted, tuple(effect for effect in effects if effect not in accepted)

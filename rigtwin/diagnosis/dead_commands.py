@@ -1,5 +1,8 @@
-"""Command channels that were not recorded: they stay put, although something shows that what was
-commanded did not. A command that is constant by itself is a test."""
+"""Command channels that were not recorded: constant, although the command must have changed.
+
+A constant command alone is no fault, as a test may hold it. It is a fault if the described
+controller or a sensor shows that the command changed.
+"""
 
 from __future__ import annotations
 
@@ -13,49 +16,54 @@ from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
 from rigtwin.signals.noise import remove_mains, white_noise
 
-CHANGES = 1e-9
-"""Share of itself by which a command changes at least."""
-MOVES = 10.0
-"""Times its noise that a signal moves at least."""
+LEAST_CHANGE = 1e-9
+"""Smallest change of a replayed command, as a share of its size."""
+LEAST_MOTION = 10.0
+"""Smallest motion of a signal, in units of its noise."""
 
 
 def dead_commands(
     machine: Machine, recording: Recording, configuration: Configuration
 ) -> dict[str, str]:
-    """Command channels that are constant and cannot have been.
+    """Find command channels that are constant although the command changed.
 
     Parameters
     ----------
     machine, recording, configuration
-        As of `find_faults`.
+        Machine, recording and configuration of the twin, as for `find_faults`.
 
     Returns
     -------
     dict
-        Channel → what shows that it changed, in words: its controller, or a sensor that follows it.
+        Channel → reason in words: its controller, or a sensor that follows it.
     """
     computed: dict[tuple[str, str], Array] | None = None
-    found: dict[str, str] = {}
+    reasons: dict[str, str] = {}
     for name, component in machine.components.items():
         channel = component.channel
         if channel is None or channel[0] != "/command" or not recording.has(*channel):
             continue
         if np.ptp(recording.column(*channel)):
             continue
+        # The controller is replayed once, and only if a command is constant.
         if computed is None:
             computed = _computed_commands(machine, recording, configuration)
         replayed = computed.get(channel)
-        if replayed is not None and np.ptp(replayed) > CHANGES * np.max(np.abs(replayed)):
-            found[".".join(channel)] = "its controller changes it"
+        if replayed is not None and np.ptp(replayed) > LEAST_CHANGE * np.max(np.abs(replayed)):
+            reasons[".".join(channel)] = "its controller changes it"
         elif (follower := _moving_follower(machine, recording, name)) is not None:
-            found[".".join(channel)] = f"{follower} moves"
-    return found
+            reasons[".".join(channel)] = f"{follower} moves"
+    return reasons
 
 
 def _computed_commands(
     machine: Machine, recording: Recording, configuration: Configuration
 ) -> dict[tuple[str, str], Array]:
-    """What the described controller makes of the recorded inputs."""
+    """Return the commands of the described controller for the recorded inputs.
+
+    Commands that are not finite are left out; a recording made with a controller of the user's own
+    has none.
+    """
     control = machine.control
     if control is None or OWN in recording.controller:
         return {}
@@ -70,20 +78,24 @@ def _computed_commands(
 
 
 def _moving_follower(machine: Machine, recording: Recording, name: str) -> str | None:
-    """The channel of a sensor that moves with a position actuator, by more than noise, mains and a
-    plate that yields to its load."""
+    """Return the channel of a position sensor that moves at the joint of a position actuator.
+
+    The motion must exceed noise, mains and the compliance of a cylinder under the measured load.
+    None if there is no such sensor.
+    """
     mover = machine.components[name]
     follows = isinstance(getattr(machine.plant, name), Cylinder | PositionActuator)
     if not follows or not mover.joint:
         return None
-    loads = [recording.column(*each.channel) for each in machine.rows if each.kind == "force"]
+    loads = [recording.column(*row.channel) for row in machine.rows if row.kind == "force"]
     most = max((float(np.ptp(load)) for load in loads), default=0.0)
+    # A loaded cylinder yields without a command: at most its largest compliance times the load.
     yields = fields(Cylinder)["compliance"].high * most
     for row in machine.rows:
         if row.kind != "position" or machine.components[row.name].joint != mover.joint:
             continue
         signal = recording.column(*row.channel)
         clean = remove_mains(signal, recording.period, machine.plant.mains.frequency)
-        if np.ptp(clean) > yields and np.std(clean) > MOVES * white_noise(signal):
+        if np.ptp(clean) > yields and np.std(clean) > LEAST_MOTION * white_noise(signal):
             return ".".join(row.channel)
     return None

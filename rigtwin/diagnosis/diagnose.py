@@ -308,7 +308,7 @@ def _diagnose_part(
         energy=_energy(evidence),
     )
     corrected = _correct(evidence.configurations[0], plant, readings.sampled)
-    otherwise = _other_explanations(explanation, named, thresholds.possible)
+    otherwise = _other_explanations(explanation, named, thresholds.alternative_weight)
     return Diagnosis(answer, evidence.machine, evidence, corrected, otherwise, held_out)
 
 
@@ -324,13 +324,13 @@ def _judge(
     validation = validate(
         evidence, explanation.fit, chosen, explanation.posterior, held_out, thresholds
     )
-    named, notes = validation.kept, []
+    named, notes = validation.accepted, []
     has_residual = _has_residual(explanation, named)
     if validation.rejected:
         names = " and ".join(effect.name for effect in validation.rejected)
         notes.append(f"{names} rejected: the prediction of held-out data became worse with it")
     # Beside a large residual, an effect that removes little of any signal's gap is a coincidence.
-    if named and has_residual and validation.largest < thresholds.removes:
+    if named and has_residual and validation.largest < thresholds.removed_share:
         names = " and ".join(effect.name for effect in named)
         share = f"{100 * validation.largest:.0f} %"
         notes.append(f"{names} not named: the correction closes at most {share} of a signal's gap")
@@ -343,7 +343,7 @@ def _has_residual(explanation: Explanation, named: Sequence[Effect]) -> bool:
     """Return whether more than noise and declared error remains after the named effects."""
     posterior = explanation.posterior
     if set(named) == set(posterior.best.fit.effects):
-        return posterior.leaves_something
+        return posterior.has_unexplained_residual
     identical = [
         hypothesis.scored
         for hypothesis in posterior.ranking
@@ -362,7 +362,7 @@ def _read_signals(evidence: Evidence, plant: Plant, thresholds: Thresholds) -> _
         deviation
         for deviation in deviations
         if deviation.kind in ("setting", "unknown")
-        and deviation.consequence < thresholds.consequence
+        and deviation.consequence < thresholds.controller_consequence
     )
     sampled = find_outstanding(
         evidence.machine, evidence.recordings, evidence.predict(plant), evidence.plant
@@ -378,9 +378,12 @@ def _describe_readings(
     readings: _Readings, evidence: Evidence, thresholds: Thresholds
 ) -> list[Finding]:
     return [
-        *(describe_sensor(sensor, evidence, thresholds.sure) for sensor in readings.sampled),
         *(
-            describe_controller(deviation, thresholds.sure)
+            describe_sensor(sensor, evidence, thresholds.highest_confidence)
+            for sensor in readings.sampled
+        ),
+        *(
+            describe_controller(deviation, thresholds.highest_confidence)
             for deviation in readings.deviations
             if deviation.kind != "unknown"
         ),
@@ -399,7 +402,7 @@ def _choose_verdict(
     closed = (
         validation.held_out.value if validation.measurable else posterior.closes(posterior.best)
     )
-    closes_enough = not judged.named or closed >= thresholds.explained
+    closes_enough = not judged.named or closed >= thresholds.explained_share
     return "explained" if closes_enough and not has_residual else "partly explained"
 
 
@@ -540,10 +543,10 @@ def _next_test(
         hypothesis.scored.fit
         for hypothesis in ranking
         if hypothesis.scored.fit.effects
-        and hypothesis.weight >= thresholds.member * ranking[0].weight
+        and hypothesis.weight >= thresholds.rival_weight * ranking[0].weight
     ]
     is_certain = all(
-        effect.confidence >= thresholds.unsure and len(effect.alternatives) == 1
+        effect.confidence >= thresholds.retest_confidence and len(effect.alternatives) == 1
         for effect in effects
     )
     if not tests or not named or is_certain or len(likely) < 2:

@@ -1,4 +1,7 @@
-"""Which way a recording's time runs: causes come before what they bring about."""
+"""Direction of time in a recording: a cause precedes its consequence.
+
+A dissipative machine explains its recording forwards in time and not backwards.
+"""
 
 from __future__ import annotations
 
@@ -13,50 +16,51 @@ from rigtwin.recording import Recording
 from rigtwin.signals.noise import rms, white_noise
 
 STEPS = 2
-"""Of integration a tick, for a rough prediction."""
-DIFFERS = 10.0
-"""Times its noise by which a signal has to be off before its direction is asked for."""
-NEARER = 3.0
-"""Times that the prediction from the end has to be nearer."""
+"""Integration steps per tick of a rough prediction."""
+LEAST_MISFIT = 10.0
+"""Misfit of a signal, in units of its noise, below which the direction is not questioned."""
+LEAST_RATIO = 3.0
+"""Ratio of the forward to the backward misfit above which time runs backwards."""
 
 
 def runs_backwards(
     machine: Machine, recording: Recording, configuration: Configuration, predicted: Array
 ) -> bool:
-    """Whether the machine explains a recording far better from its end than from its beginning.
+    """Return whether the machine explains a recording far better backwards than forwards.
 
     Parameters
     ----------
     machine, recording, configuration
-        As of `find_faults`.
+        Machine, recording and configuration of the twin, as for `find_faults`.
     predicted
-        Of the recording as it is, shape (rows, ticks).
+        Signals predicted forwards, shape (rows, ticks).
 
     Returns
     -------
     bool
-        False also where it cannot be told: joints that act on each other and are moved as measured
-        need the same torques either way.
+        False also where the direction is not observable: coupled joints with prescribed motion need
+        the same torques forwards and backwards.
     """
     if machine.physics.reversible:
         return False
     measured = np.stack([recording.column(*row.channel) for row in machine.rows])
-    forth = _misfits(measured, predicted)
-    if not np.isfinite(forth).all() or forth.max() < DIFFERS:
+    forward = _misfits(measured, predicted)
+    # The reversed prediction costs a simulation, so that it is made only if the forward one fails.
+    if not np.isfinite(forward).all() or forward.max() < LEAST_MISFIT:
         return False
     columns = {
         topic: {name: values[::-1] for name, values in signals.items()}
         for topic, signals in recording.columns.items()
     }
-    turned = replace(recording, columns=columns)
-    model = machine.physics.model(machine, turned.inputs, configuration, STEPS)
-    back = _misfits(measured[:, ::-1], model.predict(configuration.plant))
-    return bool(np.isfinite(back).all()) and NEARER * rms(back) < rms(forth)
+    reversed_recording = replace(recording, columns=columns)
+    model = machine.physics.model(machine, reversed_recording.inputs, configuration, STEPS)
+    backward = _misfits(measured[:, ::-1], model.predict(configuration.plant))
+    return bool(np.isfinite(backward).all()) and LEAST_RATIO * rms(backward) < rms(forward)
 
 
 def _misfits(measured: Array, predicted: Array) -> Array:
-    """rms of what each signal differs by, its mean apart, in units of its noise; shape (rows,)."""
-    left = measured - predicted
-    left = left - left.mean(axis=1, keepdims=True)
+    """Return the standard deviation of each signal's residual in units of its noise, (rows,)."""
+    residual = measured - predicted
+    residual = residual - residual.mean(axis=1, keepdims=True)
     noise = [max(white_noise(row), 1e-12 * rms(row), 1e-300) for row in measured]
-    return np.sqrt(np.mean(left**2, axis=1)) / np.array(noise)
+    return np.sqrt(np.mean(residual**2, axis=1)) / np.array(noise)

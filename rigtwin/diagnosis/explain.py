@@ -1,4 +1,4 @@
-"""Which effects explain the evidence, and how sure that is."""
+"""Explanation of the evidence: the best hypothesis and the weights of all others."""
 
 from __future__ import annotations
 
@@ -10,51 +10,51 @@ import numpy as np
 from rigtwin.components import Effect
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.first_look import FirstLook
-from rigtwin.diagnosis.fit import Fit, clashes, is_possible, without_each
+from rigtwin.diagnosis.fit import Fit, clashes, is_possible, leave_one_out
 from rigtwin.diagnosis.fitter import Fitter
-from rigtwin.diagnosis.posterior import Posterior
-from rigtwin.diagnosis.search import Search
+from rigtwin.diagnosis.posterior import HypothesisPosterior
+from rigtwin.diagnosis.search import HypothesisSearch
 from rigtwin.diagnosis.threads import Threads
 from rigtwin.diagnosis.thresholds import STANDARD, Thresholds
 
-UNSEEN = 60.0
+OBSERVABLE = 60.0
 """Chi-square that an effect must change at some size to count as observable."""
 
 
 @dataclass(frozen=True)
 class Explanation:
-    """Everything that a search found.
+    """Result of a search.
 
-    Parameters
+    Attributes
     ----------
     posterior
-        All hypotheses that were tried, with their weights.
+        Weights of all scored hypotheses.
     fit
-        The best hypothesis, fitted to all ticks.
+        Best hypothesis, fitted to all ticks.
     unobservable
-        Effects that no size tried makes noticeable on this evidence.
+        Effects that are not observable on this evidence at any simulated size.
     chain
-        Nested fits that lead to the best hypothesis, of one effect first.
+        Nested fits that lead to the best hypothesis, the fit of a single effect first.
     """
 
-    posterior: Posterior
+    posterior: HypothesisPosterior
     fit: Fit
     unobservable: tuple[Effect, ...]
     chain: tuple[Fit, ...]
 
 
 def candidates(evidence: Evidence) -> list[Effect]:
-    """Return the effects that are searched for.
+    """Return the candidate effects of a search.
 
     Parameters
     ----------
     evidence
-        The recordings, about their nominal plant.
+        Recordings about their nominal plant.
 
     Returns
     -------
     list of Effect
-        Effects that the machine can have and that are not read off a signal.
+        Effects that the machine can have, without those that are read off a single signal.
     """
     return [effect for effect in evidence.machine.effects() if effect.searched]
 
@@ -65,30 +65,31 @@ def explain(
     thresholds: Thresholds = STANDARD,
     first_look: Callable[[FirstLook], object] = lambda _: None,
 ) -> Explanation:
-    """Search all candidates for what explains the evidence.
+    """Search the candidate effects for the hypothesis that explains the evidence best.
 
     Parameters
     ----------
     evidence
-        The recordings, about their nominal plant.
+        Recordings about their nominal plant.
     progress
-        Called with the number of fits done since its last call.
+        Called with the number of fits completed since the last call.
     thresholds
-        Numbers that the search goes by.
+        Thresholds of search and score.
     first_look
-        Called once every effect was tried, before any is fitted.
+        Called with the first look once all effects are screened, before any is fitted.
 
     Returns
     -------
     Explanation
-        Everything tried, and the best hypothesis.
+        Best hypothesis, and the weights of all others.
     """
     effects = candidates(evidence)
     with Threads(progress) as threads:
-        search = Search(evidence, effects, thresholds, threads, first_look)
+        search = HypothesisSearch(evidence, effects, thresholds, threads, first_look)
         posterior = search.run()
         best = posterior.best.fit
         fit = best
+        # A search on thinned ticks is followed by one fit to all of them.
         if best.effects and search.fine.evidence is not evidence:
             fit = Fitter(evidence).refit_with_tolerances(best)
         return Explanation(
@@ -99,37 +100,41 @@ def explain(
         )
 
 
-def _unobservable(search: Search, posterior: Posterior) -> tuple[Effect, ...]:
-    """Effects that do nothing at the nominal plant, and nothing beside the best hypothesis either,
-    as a refinement of friction does where there is none."""
-    coarse, best = search.coarse, posterior.best.fit
-    fitted = {effect for each in posterior.ranking for effect in each.scored.fit.effects}
+def _unobservable(search: HypothesisSearch, posterior: HypothesisPosterior) -> tuple[Effect, ...]:
+    """Return the effects unobservable both at the nominal plant and beside the best hypothesis.
 
-    def shows(effect: Effect) -> bool:
-        if coarse.largest_response(effect) >= UNSEEN or effect in fitted:
+    A refinement of dry friction, for example, has no response at a nominal plant without friction,
+    but may have one beside a fitted friction.
+    """
+    coarse, best = search.coarse, posterior.best.fit
+    fitted = {effect for weighted in posterior.ranking for effect in weighted.scored.fit.effects}
+
+    def is_observable(effect: Effect) -> bool:
+        if coarse.largest_response(effect) >= OBSERVABLE or effect in fitted:
             return True
+        # An effect that excludes a fitted one cannot be simulated beside it, and stays open.
         if clashes(effect, best.effects):
             return True
         if not best.effects or not is_possible((*best.effects, effect), coarse.plant):
             return False
         responses = coarse.responses_beside(effect, best)
-        most = max(coarse.space.misfit(each.astype(np.float64)) for _, each in responses)
-        return most >= UNSEEN
+        largest = max(coarse.space.misfit(part.astype(np.float64)) for _, part in responses)
+        return largest >= OBSERVABLE
 
-    return tuple(effect for effect in search.effects if not shows(effect))
+    return tuple(effect for effect in search.effects if not is_observable(effect))
 
 
-def _nest(search: Search, fit: Fit) -> list[Fit]:
-    """The best hypothesis, and before it the best with one effect fewer each time."""
+def _nest(search: HypothesisSearch, fit: Fit) -> list[Fit]:
+    """Return nested fits that end with the best hypothesis, each with one effect more."""
     chain = [fit]
     while len(chain[0].effects) > 1:
         fewer = []
-        for _, rest, values in without_each(chain[0]):
-            if not is_possible(rest, search.fine.plant):
+        for _, remaining, values in leave_one_out(chain[0]):
+            if not is_possible(remaining, search.fine.plant):
                 continue
-            known = search.pool.get(frozenset(rest))
-            fewer.append(known.fit if known is not None else search.fine.refine(rest, values))
+            known = search.pool.get(frozenset(remaining))
+            fewer.append(known.fit if known is not None else search.fine.refine(remaining, values))
         if not fewer:
             break
-        chain.insert(0, min(fewer, key=lambda each: each.misfit))
-    return [each for each in chain if each.effects]
+        chain.insert(0, min(fewer, key=lambda fit: fit.misfit))
+    return [fit for fit in chain if fit.effects]

@@ -14,7 +14,6 @@ from rigtwin.diagnosis.evidence import Evidence, relative_errors
 from rigtwin.diagnosis.explain import Explanation
 from rigtwin.diagnosis.finding import Estimate, Finding, Name, Nearest, Rival, Unobservable
 from rigtwin.diagnosis.fit import Fit
-from rigtwin.diagnosis.posterior import Posterior
 from rigtwin.diagnosis.sampling import SensorProperty
 from rigtwin.diagnosis.support import Support
 from rigtwin.diagnosis.text import format_distinct
@@ -88,7 +87,7 @@ def choose_named(
         strict=True,
     ):
         nominal = effect.nominal(posterior.nominal)[effect.kind.parameters[0]]
-        if abs(values[0] - nominal) <= thresholds.wider * widths[0]:
+        if abs(values[0] - nominal) <= thresholds.interval_half_width * widths[0]:
             # The interval holds the nominal value, so the data do not ask for a change.
             continue
         shares = [
@@ -97,7 +96,7 @@ def choose_named(
         probability = min(sum(shares), 1.0) * (1.0 - support[effect].mimic)
         # Effective number of rivals (inverse participation ratio): n for n equal shares.
         members = sum(shares) ** 2 / sum(share**2 for share in shares)
-        if probability >= thresholds.nameable and members <= thresholds.members:
+        if probability >= thresholds.naming_confidence and members <= thresholds.rival_count:
             named.append(effect)
     return tuple(named)
 
@@ -140,8 +139,10 @@ def describe_attributed(
         findings.append(
             Finding(
                 name=_name(effect),
-                parameters=estimates(effect, values, widths, evidence, thresholds.wider),
-                confidence=min(support[effect].confidence, thresholds.sure),
+                parameters=estimates(
+                    effect, values, widths, evidence, thresholds.interval_half_width
+                ),
+                confidence=min(support[effect].confidence, thresholds.highest_confidence),
                 alternatives=tuple(_name(candidate) for candidate in (effect, *rivals)),
                 share=shares[effect],
                 title=effect.kind.title,
@@ -197,14 +198,14 @@ def _standard_errors(
         parts = zip(scored, fitted, posterior.spread(effect), strict=True)
         formal = [math.hypot(max(held_out, fit), spread) for held_out, fit, spread in parts]
         distance = abs(values[0] - nominal)
-        bias = thresholds.aligned / support[effect].dominance * distance
-        widest = max(formal[0], WIDEST * distance / thresholds.wider)
+        bias = thresholds.rest_correlation / support[effect].dominance * distance
+        widest = max(formal[0], WIDEST * distance / thresholds.interval_half_width)
         errors.append((min(math.hypot(formal[0], bias), widest), *formal[1:]))
     return errors
 
 
 def _shares(
-    fit: Fit, named: Sequence[Effect], evidence: Evidence, posterior: Posterior
+    fit: Fit, named: Sequence[Effect], evidence: Evidence, posterior: HypothesisPosterior
 ) -> dict[Effect, float]:
     """Split the explained share of the gap's power among effects.
 
@@ -262,7 +263,9 @@ def find_traces(
         return tuple(
             Finding(
                 name=_name(effect),
-                parameters=estimates(effect, values, widths, evidence, thresholds.wider),
+                parameters=estimates(
+                    effect, values, widths, evidence, thresholds.interval_half_width
+                ),
                 confidence=posterior.inclusion(effect),
                 alternatives=(_name(effect),),
                 share=max(gained, 0.0) / len(additional),
@@ -314,7 +317,7 @@ def estimates(
     values: Sequence[float],
     widths: Sequence[float],
     evidence: Evidence,
-    wider: float = STANDARD.wider,
+    wider: float = STANDARD.interval_half_width,
 ) -> dict[str, Estimate]:
     """Return the fitted parameters of an effect with their intervals.
 

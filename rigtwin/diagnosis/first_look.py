@@ -69,11 +69,11 @@ def look_first(
         Gap of each sensor, and the suspects.
     """
     evidence = fitter.evidence
-    gap = fitter.nothing.misfit - evidence.expected
+    gap = fitter.nominal_fit.misfit - evidence.expected
     foremost = sorted(screened, key=lambda effect: -effect.promise)[:MOST_SUSPECTS]
     most = foremost[0].promise if foremost else 0.0
     # A gap in few frequencies is lost in the χ² of all of them, but one effect still explains it.
-    has_gap = gap > thresholds.rest * evidence.expected or most > 2.0 * least
+    has_gap = gap > thresholds.residual_excess * evidence.expected or most > 2.0 * least
     suspects = [
         (
             Name(candidate.effect.component, candidate.effect.kind.name),

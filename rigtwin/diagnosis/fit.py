@@ -1,4 +1,4 @@
-"""Effects with the values that explain some evidence best."""
+"""Fitted effects: the values that explain some evidence best."""
 
 from __future__ import annotations
 
@@ -10,14 +10,31 @@ from rigtwin.components.guide import THROUGH_FRICTION
 from rigtwin.components.plant import P, Plant, with_parameters
 
 Values = tuple[tuple[float, ...], ...]
-"""Of effects, one tuple each, in the order of its parameters."""
+"""Values of several effects: one tuple per effect, in the order of its kind's parameters."""
 
 
 @dataclass(frozen=True)
 class Fit:
-    """Effects with the values that explain the evidence best. misfit: χ² with tolerances and their
-    prior; widths: standard deviation of each value; plant: with them; base: the nominal plant that
-    uses its mechanical tolerances by `used` half widths, None where they were not taken."""
+    """Effects with the values that explain the evidence best.
+
+    Attributes
+    ----------
+    effects
+        Fitted effects.
+    values
+        Values of each effect, in the units of its parameters.
+    misfit
+        Chi-square of the residual, profiled over the tolerances with their prior.
+    widths
+        Standard deviation of each value.
+    plant
+        Nominal plant with the fitted effects.
+    base
+        Nominal plant with its mechanical tolerances moved by `used`. None where the tolerances were
+        not estimated at the fit.
+    used
+        Displacement of each mechanical tolerance in `base`, in half widths.
+    """
 
     effects: tuple[Effect, ...]
     values: Values
@@ -29,25 +46,26 @@ class Fit:
 
     @property
     def name(self) -> str:
+        """Names of the effects, joined by a plus sign."""
         return " + ".join(effect.name for effect in self.effects) or "none"
 
 
 def with_values(plant: P, effects: Sequence[Effect], values: Sequence[Sequence[float]]) -> P:
-    """The plant with effects of these values.
+    """Set effects of a plant to given values.
 
     Parameters
     ----------
     plant
-        Without them.
+        Plant without the effects.
     effects
-        Any that do not clash.
+        Effects that do not clash with each other.
     values
-        One tuple an effect, in the order of its parameters.
+        Values of each effect, in the order of its kind's parameters.
 
     Returns
     -------
     plant
-        Of the same type.
+        Plant of the same type with the effects.
     """
     for effect, numbers in zip(effects, values, strict=True):
         changes = dict(zip(effect.kind.parameters, numbers, strict=True))
@@ -55,39 +73,42 @@ def with_values(plant: P, effects: Sequence[Effect], values: Sequence[Sequence[f
     return plant
 
 
-def clashes(effect: Effect, others: Sequence[Effect]) -> bool:
-    """Whether an effect sets a parameter that another sets too.
+def clashes(effect: Effect, effects: Sequence[Effect]) -> bool:
+    """Return whether an effect sets a parameter that one of several effects sets too.
 
     Parameters
     ----------
     effect
-        The one.
-    others
-        The others.
+        Effect that may be added.
+    effects
+        Effects of a hypothesis.
 
     Returns
     -------
     bool
-        True if they cannot stand together.
+        True if the effect and the hypothesis exclude each other.
     """
-    own = set(effect.kind.parameters)
-    return any(other.group == effect.group and own & set(other.kind.parameters) for other in others)
+    parameters = set(effect.kind.parameters)
+    return any(
+        member.group == effect.group and parameters & set(member.kind.parameters)
+        for member in effects
+    )
 
 
 def is_possible(effects: Sequence[Effect], plant: Plant) -> bool:
-    """Whether each effect has what it acts through.
+    """Return whether every effect has the dry friction that it acts through.
 
     Parameters
     ----------
     effects
-        Of one explanation.
+        Effects of one hypothesis.
     plant
-        Without them.
+        Plant without the effects.
 
     Returns
     -------
     bool
-        False if a guide's play, spring or Stribeck peak has no dry friction to act through.
+        False if a play, a spring or a Stribeck peak of a guide has no dry friction in series.
     """
     dry = {effect.group for effect in effects if effect.kind.name == "coulomb"}
     return all(
@@ -99,18 +120,18 @@ def is_possible(effects: Sequence[Effect], plant: Plant) -> bool:
     )
 
 
-def without_each(fit: Fit) -> Iterator[tuple[Effect, tuple[Effect, ...], Values]]:
-    """Leaves out each effect of a fit in turn.
+def leave_one_out(fit: Fit) -> Iterator[tuple[Effect, tuple[Effect, ...], Values]]:
+    """Leave out each effect of a fit in turn.
 
     Parameters
     ----------
     fit
-        Of one effect or more.
+        Fit of at least one effect.
 
     Yields
     ------
     tuple
-        The effect left out, the others, and their values.
+        Effect that is left out, the remaining effects, and their values.
     """
     for number, effect in enumerate(fit.effects):
         yield (

@@ -1,5 +1,10 @@
-"""Fits effects to evidence: Gauss-Newton on their parameters, all tolerances free within their
-prior beside them."""
+"""Fits of effects to evidence: Gauss-Newton on the effects' parameters, with all tolerances free
+within their priors.
+
+An effect is first screened: it is simulated at several values, and its promise is the chi-square
+that the best strength of any of these responses would explain to first order. With the response d,
+the residual r and the tolerances eliminated (`Space.strengths`), that is (d'r)^2 / d'd.
+"""
 
 from __future__ import annotations
 
@@ -21,38 +26,48 @@ from rigtwin.diagnosis.space import Space
 from rigtwin.diagnosis.swing import swings
 from rigtwin.numerics.arrays import Array
 
-SHAKES = (0.88, 0.95, 1.05, 1.12)
-"""Shares of a value at which a fit is tried to be better yet."""
-SETTLING = 2
-"""Times that the tolerances are taken anew at a fit."""
-UNMOVED = 0.05
-"""Half widths by which no tolerance may have moved for it not to be taken anew."""
-AT_BOUND = 1e-3
-"""Share of a bound within which a value stands at it."""
-REFINED = 3
-"""Starts that are followed to their end at most."""
-WORTH = 0.5
-"""Share of the best start's gain that another may lack and still be followed."""
+PERTURBATIONS = (0.88, 0.95, 1.05, 1.12)
+"""Factors of a fitted value from which the fit is repeated."""
+TOLERANCE_PASSES = 2
+"""Number of times that the tolerances are estimated at a fit."""
+TOLERANCE_CHANGE = 0.05
+"""Change of every tolerance, in half widths, below which they are not estimated again."""
+BOUND_SHARE = 1e-3
+"""Distance from a bound, as a share of it, within which a value stands at the bound."""
+REFINED_STARTS = 3
+"""Largest number of starts of a single effect that are refined."""
+START_SHORTFALL = 0.5
+"""A start is refined if it gains at most this share less than the best start."""
 LIMITS = ("saturation", "rate_limit", "resonance", "force_limit")
-"""Kinds whose magnitude is no measure of what they do."""
-KEPT = 64
-"""Responses beside a fit that are kept."""
-SMALL = 0.05
-"""Share of the smallest start at which an effect is tried too."""
-SUFFICIENT = 0.95
-"""Share of what noise and declared error leave below which no better fit is looked for nearby."""
-SMALLER = 0.2
-"""Share of the smallest start at which an effect is tried beside others as well."""
-NOTHING = 1e-3
-"""χ² below which an effect does nothing at all."""
+"""Kinds whose response does not scale with their magnitude."""
+CACHED_RESPONSES = 64
+"""Number of cached responses beside a fit."""
+SMALL_START = 0.05
+"""Share of the smallest start at which an effect is simulated as well."""
+SUFFICIENT_RATIO = 0.95
+"""Ratio of the misfit to that of noise and declared error below which no perturbed start is
+tried."""
+SMALL_START_BESIDE = 0.2
+"""Share of the smallest start at which an effect is simulated as well beside other effects."""
+NO_RESPONSE = 1e-3
+"""Chi-square below which an effect has no response."""
 Responses = list[tuple[tuple[float, ...], Array]]
-"""Of an effect: values that were tried, and what each changes, whitened."""
+"""Simulated values of one effect, and the whitened response to each."""
 
 
 @dataclass(frozen=True)
 class Screened:
-    """An effect before it is fitted. starts: misfit and values of all that were tried, the best
-    first; promise: χ² that it may explain, to first order."""
+    """An effect before it is fitted.
+
+    Attributes
+    ----------
+    effect
+        Screened effect.
+    starts
+        Misfit and values of all simulated starts, the best first.
+    promise
+        Chi-square that the effect may explain, to first order.
+    """
 
     effect: Effect
     starts: tuple[tuple[float, tuple[float, ...]], ...]
@@ -60,38 +75,51 @@ class Screened:
 
 
 class Fitter:
-    """Fits any effects to one body of evidence."""
+    """Screens and fits effects on one body of evidence.
+
+    Attributes
+    ----------
+    evidence
+        Recordings that are explained.
+    plant
+        Nominal plant.
+    swing
+        Swing of each command over all recordings, by the component that it moves.
+    """
 
     def __init__(self, evidence: Evidence) -> None:
         self.evidence, self.plant = evidence, evidence.plant
         self.swing = swings(evidence.machine, evidence.recordings)
         self._scales: dict[str, Scales] = {}
-        self._nominal = evidence.residual(evidence.plant)
+        self._nominal_residual = evidence.residual(evidence.plant)
         self._responses: dict[Effect, Responses] = {}
         self._beside: dict[tuple[object, ...], Responses] = {}
-        self._residual: tuple[tuple[tuple[Effect, ...], Values], Array] = ((), ()), self._nominal
+        self._residual: tuple[tuple[tuple[Effect, ...], Values], Array]
+        self._residual = ((), ()), self._nominal_residual
 
     @cached_property
     def space(self) -> Space:
-        """The tolerances about the nominal plant."""
+        """Tolerances about the nominal plant."""
         return Space(self.evidence, self.plant)
 
     @cached_property
-    def nothing(self) -> Fit:
-        """The nominal plant."""
-        return Fit((), (), self.space.misfit(self._nominal), (), self.plant)
+    def nominal_fit(self) -> Fit:
+        """Fit without effects: the nominal plant."""
+        return Fit((), (), self.space.misfit(self._nominal_residual), (), self.plant)
 
     def starts(self, effect: Effect) -> Starts:
-        """Where a search for an effect starts."""
+        """Return the values from which a search for an effect starts."""
         return self._starts_at(effect, self.plant)
 
     def _starts_at(self, effect: Effect, plant: Plant) -> Starts:
-        own = self.swing.get(effect.component, Swing())
-        return effect.starts(plant, own, lambda: self._scale(effect.group))
+        swing = self.swing.get(effect.component, Swing())
+        return effect.starts(plant, swing, lambda: self._scale(effect.group))
 
     def _scale(self, component: str) -> Scales:
-        """What a component goes through on these recordings, by the nominal plant and by what is
-        measured of the force."""
+        """Return the scales of a component's motion and force on the longest recording.
+
+        The motion is simulated with the nominal plant; the force is the largest measured one.
+        """
         if component not in self._scales:
             longest = max(
                 range(len(self.evidence.models)), key=lambda n: self.evidence.recordings[n].ticks
@@ -100,109 +128,125 @@ class Fitter:
             forces = [
                 measured[n] for n, row in enumerate(self.evidence.machine.rows) if row.kind in JUMPS
             ]
-            force = max((float(np.sqrt(np.mean(each**2))) for each in forces), default=0.0)
+            force = max((float(np.sqrt(np.mean(column**2))) for column in forces), default=0.0)
             motion = self.evidence.models[longest].motion(component, self.plant)
             self._scales[component] = Scales.of(motion, force, self.evidence.lines[longest].period)
         return self._scales[component]
 
     def _few_starts(self, effect: Effect, plant: Plant) -> list[tuple[float, ...]]:
-        """A small and a middle magnitude of each shape and sign: responses scale with their
-        magnitude, but those of small ones need not resemble those of large ones."""
+        """Return a small and a middle magnitude of each shape and sign.
+
+        A response scales with its magnitude only over a limited range: dry friction that exceeds
+        the driving force, for example, stops the motion.
+        """
         starts = self._starts_at(effect, plant)
         nominal = effect.nominal(plant)[effect.kind.parameters[0]]
         shapes: dict[tuple[float, ...], list[tuple[float, ...]]] = {}
         for values in starts.values:
             sign = 1.0 if values[0] >= nominal else -1.0
             shapes.setdefault((sign, *values[1:]), []).append(values)
-        found = []
+        few = []
         for values in shapes.values():
-            values.sort(key=lambda each: abs(each[0] - nominal))
-            found.append(values[len(values) // 2])
+            values.sort(key=lambda start: abs(start[0] - nominal))
+            few.append(values[len(values) // 2])
             if effect.kind.name not in LIMITS and not starts.quadrature:
-                small = nominal + SMALLER * (values[0][0] - nominal)
-                found.append((small, *values[0][1:]))
-        return found
+                small = nominal + SMALL_START_BESIDE * (values[0][0] - nominal)
+                few.append((small, *values[0][1:]))
+        return few
 
     def screen(self, effect: Effect) -> Screened:
-        """What one effect does at every value that a search for it starts from.
+        """Simulate one effect at every value from which a search for it starts.
 
         Parameters
         ----------
         effect
-            One that is searched for.
+            Candidate effect.
 
         Returns
         -------
         Screened
-            Its starts, and what it promises to explain.
+            Starts of the effect, and its promise.
         """
-        found = self.starts(effect)
+        starts = self.starts(effect)
         if not is_possible((effect,), self.plant):
+            # Without dry friction at its guide the effect has no response at any size.
             self._responses[effect] = [
-                (values, np.zeros_like(self._nominal, np.float32)) for values in found.values
+                (values, np.zeros_like(self._nominal_residual, np.float32))
+                for values in starts.values
             ]
-            return Screened(effect, ((self.nothing.misfit, found.values[0]),), 0.0)
+            return Screened(effect, ((self.nominal_fit.misfit, starts.values[0]),), 0.0)
         scored: list[tuple[float, tuple[float, ...]]] = []
         responses = []
-        for start in found.values:
+        for start in starts.values:
             residual = self.evidence.residual(with_values(self.plant, (effect,), (start,)))
             scored.append((self.space.misfit(residual), start))
-            responses.append((start, (self._nominal - residual).astype(np.float32)))
+            # Single precision halves the memory of some hundred responses, and suffices to choose.
+            responses.append((start, (self._nominal_residual - residual).astype(np.float32)))
         self._responses[effect] = responses
-        if found.quadrature:
+        if starts.quadrature:
             scored += self._blend(effect, responses)
         scored.sort()
-        promise = max(self.nothing.misfit - scored[0][0], self._promise(effect, responses))
+        promise = max(self.nominal_fit.misfit - scored[0][0], self._promise(effect, responses))
         return Screened(effect, tuple(scored), promise)
 
     def _promise(self, effect: Effect, responses: Responses) -> float:
-        """χ² that the best strength of any response explains, or of a small one, which large ones
-        need not resemble."""
-        small = self.scale_start(effect, min(start for start, _ in responses), SMALL)
+        """Return the chi-square that the best strength of any response explains.
+
+        A further small magnitude is simulated, since its response may differ from those of large
+        ones.
+        """
+        small = self.scale_start(effect, min(start for start, _ in responses), SMALL_START)
         residual = self.evidence.residual(with_values(self.plant, (effect,), small))
-        shapes = [response for _, response in responses] + [self._nominal - residual]
-        # An effect that takes a tolerance's place is not what that tolerance may take up.
-        space = self.space.beside((effect,))
-        power, along = space.strengths(np.stack(shapes, axis=1).astype(np.float64), self._nominal)
-        felt = power > NOTHING
-        explained = float(np.max(along[felt] ** 2 / power[felt], initial=0.0))
-        return explained - (space.misfit(self._nominal) - self.nothing.misfit)
+        shapes = [response for _, response in responses] + [self._nominal_residual - residual]
+        # An effect that replaces a tolerance must not be judged beside that tolerance.
+        space = self.space.without_replaced((effect,))
+        power, along = space.strengths(
+            np.stack(shapes, axis=1).astype(np.float64), self._nominal_residual
+        )
+        observable = power > NO_RESPONSE
+        explained = float(np.max(along[observable] ** 2 / power[observable], initial=0.0))
+        return explained - (space.misfit(self._nominal_residual) - self.nominal_fit.misfit)
 
     def fit_one(self, screened: Screened) -> Fit:
-        """The best fit of one effect.
+        """Fit one effect.
 
         Parameters
         ----------
         screened
-            What was tried of it.
+            Screened effect.
 
         Returns
         -------
         Fit
-            From the best of its starts.
+            Best fit over the refined starts.
         """
-        # Another start is followed too where it comes near the best; where none helps, the best is
-        # followed alone.
+        # Several starts are refined where they come near the best one, as the misfit may have more
+        # than one minimum. If none improves on the nominal plant, only the best is refined.
         scored = screened.starts
-        enough = scored[0][0] + WORTH * max(self.nothing.misfit - scored[0][0], 0.0)
-        followed = [
+        enough = scored[0][0] + START_SHORTFALL * max(self.nominal_fit.misfit - scored[0][0], 0.0)
+        refined = [
             start
-            for number, (misfit, start) in enumerate(scored[:REFINED])
+            for number, (misfit, start) in enumerate(scored[:REFINED_STARTS])
             if number == 0 or misfit < enough
         ]
         return min(
-            (self.refine((screened.effect,), (start,)) for start in followed),
+            (self.refine((screened.effect,), (start,)) for start in refined),
             key=lambda fit: fit.misfit,
         )
 
     def _blend(self, effect: Effect, responses: Responses) -> list[tuple[float, tuple[float, ...]]]:
-        """The blends of neighbouring quadratures that promise most, with their misfits."""
-        left = self.space.subtract_tolerances(self._nominal)
+        """Return the blends of a wave's sine and cosine that explain most, with their misfits.
+
+        Starts of a periodic effect come in pairs of one pitch. The response to the amplitude a at
+        the phase p is a cos(p) times the first plus a sin(p) times the second response of a pair,
+        so that amplitude and phase follow from two linear strengths.
+        """
+        remainder = self.space.subtract_tolerances(self._nominal_residual)
         blends = []
-        for (start, one), (_, other) in zip(responses[::2], responses[1::2], strict=True):
-            apart = self.space.project_out(np.stack([one, other], axis=1).astype(np.float64))
-            strengths = np.linalg.lstsq(apart, left, rcond=None)[0]
-            gain = float(np.sum((apart @ strengths) ** 2))
+        for (start, cosine), (_, sine) in zip(responses[::2], responses[1::2], strict=True):
+            pair = self.space.project_out(np.stack([cosine, sine], axis=1).astype(np.float64))
+            strengths = np.linalg.lstsq(pair, remainder, rcond=None)[0]
+            gain = float(np.sum((pair @ strengths) ** 2))
             amplitude = start[0] * float(np.hypot(*strengths))
             blends.append(
                 (gain, (amplitude, start[1], float(np.arctan2(strengths[1], strengths[0]))))
@@ -215,21 +259,21 @@ class Fitter:
                 ),
                 start,
             )
-            for _, start in blends[:REFINED]
+            for _, start in blends[:REFINED_STARTS]
         ]
 
     def largest_response(self, effect: Effect) -> float:
-        """χ² of the most that any size tried of an effect changes, beyond what tolerances take up.
+        """Return the largest response of a screened effect that the tolerances cannot absorb.
 
         Parameters
         ----------
         effect
-            One that was fitted alone before.
+            Screened effect.
 
         Returns
         -------
         float
-            χ².
+            Chi-square.
         """
         return max(
             self.space.misfit(response.astype(np.float64))
@@ -237,76 +281,97 @@ class Fitter:
         )
 
     def responses_beside(self, effect: Effect, first: Fit) -> Responses:
-        """What an effect changes, for every value that a search for it starts from.
+        """Return the responses of an effect beside those of a fit.
 
         Parameters
         ----------
         effect
-            One that was fitted alone before.
+            Screened effect.
         first
-            A fit of others.
+            Fit of other effects.
 
         Returns
         -------
         list of tuples
-            Values, and the response beside `first`.
+            Values of the effect, and the whitened response to each beside `first`.
         """
         if not first.effects:
             return self._responses[effect]
-        # A wave along the stroke changes much the same whatever else is there.
+        # The response to a wave along the stroke depends little on the other effects, so that one
+        # fit's responses serve for all.
         wave = self.starts(effect).quadrature
-        known = (effect, len(first.effects) > 0) if wave else (effect, first.effects, first.values)
-        found = self._beside.get(known)
-        if found is None:
-            found = []
-            here = self.residual_at(first)
+        key = (effect, len(first.effects) > 0) if wave else (effect, first.effects, first.values)
+        responses = self._beside.get(key)
+        if responses is None:
+            responses = []
+            without = self.residual_at(first)
             for start in self._few_starts(effect, first.plant):
-                there = self.evidence.residual(with_values(first.plant, (effect,), (start,)))
-                found.append((start, (here - there).astype(np.float32)))
-            self._beside = {**dict(list(self._beside.items())[-KEPT:]), known: found}
-        return found
+                with_effect = self.evidence.residual(with_values(first.plant, (effect,), (start,)))
+                responses.append((start, (without - with_effect).astype(np.float32)))
+            # A new dictionary replaces the old one in a single assignment: threads that read the
+            # cache meanwhile never see it change under them.
+            latest = list(self._beside.items())[-CACHED_RESPONSES:]
+            self._beside = {**dict(latest), key: responses}
+        return responses
 
     def residual_at(self, fit: Fit) -> Array:
-        """The residual of a fit; that of the last one asked for is kept."""
-        known, residual = self._residual
-        if known != (fit.effects, fit.values):
-            known, residual = (fit.effects, fit.values), self.evidence.residual(fit.plant)
-            self._residual = known, residual
+        """Return the whitened residual of a fit. The latest one is cached."""
+        key, residual = self._residual
+        if key != (fit.effects, fit.values):
+            key, residual = (fit.effects, fit.values), self.evidence.residual(fit.plant)
+            # Key and residual are stored as one tuple, so that no thread sees an unmatched pair.
+            self._residual = key, residual
         return residual
 
     def scale_start(self, effect: Effect, start: tuple[float, ...], share: float) -> Values:
-        """A start with that share of its magnitude; limits, which nothing can be scaled from, as
-        they are. As the values of that one effect."""
+        """Scale the magnitude of a start about its nominal value.
+
+        Parameters
+        ----------
+        effect
+            Effect of the start.
+        start
+            Values of the effect.
+        share
+            Factor of the magnitude's difference from nominal. Limits are not scaled.
+
+        Returns
+        -------
+        tuple
+            Values of this single effect.
+        """
         nominal = effect.nominal(self.plant)[effect.kind.parameters[0]]
         if effect.kind.name in LIMITS:
             return (start,)
         return ((nominal + share * (start[0] - nominal), *start[1:]),)
 
     def refit_with_tolerances(self, fit: Fit) -> Fit:
-        """The fit again with the tolerances taken at it, and the mechanical ones used in the plant
-        itself.
+        """Refit effects with the responses to the tolerances taken at the fit.
+
+        Estimate and refit alternate. Mechanical tolerances act nonlinearly beside dry friction, so
+        they are moved in the plant itself; the others stay linear.
 
         Parameters
         ----------
         fit
-            To start from.
+            Fit about the nominal plant.
 
         Returns
         -------
         Fit
-            Of the same effects.
+            Fit of the same effects, with `base` and `used`.
         """
         tolerances = self.evidence.machine.tolerances
         mechanical = np.array([tolerance.mechanical for tolerance in tolerances], bool)
-        # A first guess of how much of them is used does not depend on where it is made.
-        space = self.space.beside(fit.effects)
+        # The responses at the nominal plant are precise enough for the first estimate.
+        space = self.space.without_replaced(fit.effects)
         used = np.zeros(len(tolerances))
         residual = self.evidence.residual(fit.plant)
-        for number in range(SETTLING):
-            found = np.where(mechanical, space.estimate_tolerances(residual), 0.0)
-            if number and np.max(np.abs(found - used), initial=0.0) < UNMOVED:
+        for number in range(TOLERANCE_PASSES):
+            estimate = np.where(mechanical, space.estimate_tolerances(residual), 0.0)
+            if number and np.max(np.abs(estimate - used), initial=0.0) < TOLERANCE_CHANGE:
                 break
-            used = found
+            used = estimate
             base = self.evidence.shift(self.plant, used.tolist())
             space = Space(
                 self.evidence, with_values(base, fit.effects, fit.values), used, fit.effects
@@ -317,18 +382,23 @@ class Fitter:
         return fit
 
     def _perturb(self, fit: Fit, space: Space, base: Plant) -> Fit:
-        """The fit, or a better one a little further away: where a stick begins or is missed, the
-        misfit has a step, and Gauss-Newton does not climb it."""
-        if is_sufficient(fit.misfit, self.evidence.expected, SUFFICIENT):
+        """Restart nearby: stick-slip makes the misfit discontinuous.
+
+        Each value is changed in turn by a few per cent, and refined again where that alone already
+        lowers the misfit.
+        """
+        if is_sufficient(fit.misfit, self.evidence.expected, SUFFICIENT_RATIO):
             return fit
         for number, effect in enumerate(fit.effects):
-            for place, share in product(range(len(effect.kind.parameters)), SHAKES):
-                own = list(fit.values[number])
-                # A magnitude is off nominal by another share; what else there is, is another.
-                about = place > 0 or effect.kind.name in LIMITS
-                nominal = 0.0 if about else effect.nominal(self.plant)[effect.kind.parameters[0]]
-                own[place] = nominal + share * (own[place] - nominal)
-                values = (*fit.values[:number], tuple(own), *fit.values[number + 1 :])
+            for place, share in product(range(len(effect.kind.parameters)), PERTURBATIONS):
+                perturbed = list(fit.values[number])
+                # Magnitudes are scaled about their nominal value, shapes and limits about 0.
+                from_zero = place > 0 or effect.kind.name in LIMITS
+                nominal = (
+                    0.0 if from_zero else effect.nominal(self.plant)[effect.kind.parameters[0]]
+                )
+                perturbed[place] = nominal + share * (perturbed[place] - nominal)
+                values = (*fit.values[:number], tuple(perturbed), *fit.values[number + 1 :])
                 if (
                     space.misfit(self.evidence.residual(with_values(base, fit.effects, values)))
                     < fit.misfit
@@ -336,33 +406,47 @@ class Fitter:
                     fit = min(
                         fit,
                         self.refine(fit.effects, values, space, base),
-                        key=lambda each: each.misfit,
+                        key=lambda candidate: candidate.misfit,
                     )
         return fit
 
     def bounds(self, effects: Sequence[Effect]) -> tuple[Array, Array]:
-        """Between which the values of effects are searched, shape (parameters,) each: their own
-        bounds, or narrower ones by what the recordings can show."""
+        """Return the range in which the values of effects are searched.
+
+        Parameters
+        ----------
+        effects
+            Effects that are fitted together.
+
+        Returns
+        -------
+        tuple of arrays
+            Lowest and highest values, shape (parameters,) each: the bounds of the parameters'
+            quantities, narrowed to what the recordings can show.
+        """
         low: list[float] = []
         high: list[float] = []
         for effect in effects:
-            own = [(quantity.low, quantity.high) for quantity in effect.quantities().values()]
-            narrower = self.starts(effect).bounds or own
-            low += [max(one[0], two[0]) for one, two in zip(own, narrower, strict=True)]
-            high += [min(one[1], two[1]) for one, two in zip(own, narrower, strict=True)]
+            allowed = [(quantity.low, quantity.high) for quantity in effect.quantities().values()]
+            observable = self.starts(effect).bounds or allowed
+            low += [max(a[0], b[0]) for a, b in zip(allowed, observable, strict=True)]
+            high += [min(a[1], b[1]) for a, b in zip(allowed, observable, strict=True)]
         return np.array(low), np.array(high)
 
     def is_bounded(self, fit: Fit) -> bool:
-        """Whether a value stands at the end of the range that it is searched in, or a guide's
-        friction would push. 0 is no end: what is not there is not there."""
+        """Return whether a fit is held by a bound and not by the data.
+
+        A value at the end of its range counts, unless that end is 0, where the effect is absent.
+        So does a guide whose fitted friction would drive the motion.
+        """
         guides = {effect.group for effect in fit.effects if effect.of is Guide}
         if not all(resists(getattr(fit.plant, name)) for name in guides):
             return True
         low, high = self.bounds(fit.effects)
-        values = np.concatenate([np.asarray(each) for each in fit.values])
+        values = np.concatenate([np.asarray(numbers) for numbers in fit.values])
         return bool(
             any(
-                np.any((end != 0.0) & (np.abs(values - end) <= AT_BOUND * np.abs(end)))
+                np.any((end != 0.0) & (np.abs(values - end) <= BOUND_SHARE * np.abs(end)))
                 for end in (low, high)
             )
         )
@@ -374,23 +458,23 @@ class Fitter:
         space: Space | None = None,
         base: Plant | None = None,
     ) -> Fit:
-        """Gauss-Newton with halved steps.
+        """Fit effects by Gauss-Newton from one start.
 
         Parameters
         ----------
         effects
-            That are fitted together.
+            Effects that are fitted together.
         start
-            Values to start from, one tuple an effect.
+            Starting values of each effect.
         space
-            The tolerances, by default those about the nominal plant.
+            Tolerances that are free beside the effects. Defaults to those about the nominal plant.
         base
-            The plant without the effects, by default the nominal one.
+            Plant without the effects. Defaults to the nominal plant.
 
         Returns
         -------
         Fit
-            Where no step gains any more.
+            Fit from which no further step gains enough.
         """
         space, base = space or self.space, base or self.plant
         if not effects:
@@ -405,7 +489,7 @@ class Fitter:
         def residual(vector: Array) -> Array:
             return self.evidence.residual(with_values(base, effects, split(vector)))
 
-        found = minimise(
+        minimum = minimise(
             residual,
             space,
             np.concatenate([np.asarray(values, float) for values in start]),
@@ -413,11 +497,11 @@ class Fitter:
             self.bounds(effects),
             self.evidence.expected,
         )
-        values = split(found.values)
+        values = split(minimum.values)
         return Fit(
             effects,
             values,
-            found.misfit,
-            split(found.widths),
+            minimum.misfit,
+            split(minimum.widths),
             with_values(self.plant, effects, values),
         )

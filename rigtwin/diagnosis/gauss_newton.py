@@ -1,5 +1,13 @@
-"""The values of a few parameters that leave least of a residual, by Gauss-Newton with shortened
-steps."""
+"""Gauss-Newton minimisation of a misfit in a few bounded parameters.
+
+With the residual r, its jacobian J in units of the parameters' steps, and the tolerances eliminated
+from the normal equations (`Space.normal_equations`), an iteration solves
+
+    (N + D) m = -g,        D = DAMPING diag(N),
+
+and tries the shares 1, 0.5, 0.2 and 0.05 of the move m until the misfit falls
+[Nocedal, Wright, Numerical Optimization, 2006, chapter 10].
+"""
 
 from __future__ import annotations
 
@@ -11,36 +19,43 @@ import numpy as np
 from rigtwin.diagnosis.space import Space
 from rigtwin.numerics.arrays import Array
 
-PARTS = (1.0, 0.5, 0.2, 0.05)
-"""Of a step that are tried in turn."""
+MOVE_SHARES = (1.0, 0.5, 0.2, 0.05)
+"""Shares of a move that are tried in turn."""
 ITERATIONS = 16
-"""Times that derivatives are taken at most."""
-GAINED = 0.2
-"""χ² that a step must gain to be followed by another."""
+"""Largest number of iterations."""
+LEAST_GAIN = 0.2
+"""Chi-square that a move must gain for the minimisation to continue."""
 DAMPING = 1e-6
 """Share of the normal matrix' diagonal that is added to it."""
-
-
-SHARE = 1e-3
-"""Share of the misfit beyond noise that a step must gain as well: beside what a model always
-leaves, smaller gains say nothing."""
-WIDEST, WIDENED = 5.0, 1.1
-"""Factor by which the steps of the derivatives are widened once where nothing is gained, if the
-misfit is that many times what noise leaves. Stick-slip makes the misfit discontinuous, and wide
-steps see over its small jumps."""
-
-
+LEAST_GAIN_SHARE = 1e-3
+"""Share of the misfit beyond noise that a move must gain as well. Where the model's own error
+dominates the misfit, smaller gains are not significant."""
+WIDENING = 5.0
+"""Factor by which the steps of the derivatives are widened once, where no move gains anything.
+Stick-slip makes the misfit discontinuous, and a wide step averages over its small jumps."""
+SUFFICIENT_MISFIT = 1.1
+"""Ratio of the misfit to that of noise below which a fit is close enough."""
 OVERESTIMATED = 0.8
-"""Share of the expected misfit below which the noise was estimated too large."""
-RESPONSE, SHORTEST = 0.05, 1e-3
-"""Share of the misfit that a derivative's step should change, and share of the given step that it
-has at least."""
+"""Ratio of the misfit to that of noise below which the noise was overestimated."""
+LARGEST_RESPONSE = 0.05
+"""Largest share of the misfit that the step of a derivative should change."""
+SHORTEST_STEP = 1e-3
+"""Shortest step of a derivative, as a share of the given step."""
 
 
 @dataclass(frozen=True)
 class Minimum:
-    """values: of the parameters, shape (parameters,); misfit: there; widths: their standard
-    deviations."""
+    """Result of a minimisation.
+
+    Attributes
+    ----------
+    values
+        Values of the parameters, shape (parameters,).
+    misfit
+        Chi-square at these values.
+    widths
+        Standard deviation of each value, shape (parameters,).
+    """
 
     values: Array
     misfit: float
@@ -55,68 +70,84 @@ def minimise(
     bounds: tuple[Array, Array],
     expected: float,
 ) -> Minimum:
-    """Goes down from a start.
+    """Minimise a misfit from one start.
 
     Parameters
     ----------
     residual
-        Of values, shape (parameters,), whitened.
+        Function of the values, shape (parameters,), that returns the whitened residual.
     space
-        The tolerances that are free beside them.
+        Tolerances that are free beside the parameters.
     start, steps
-        Values, and steps of their derivatives, shape (parameters,).
+        Starting values, and steps of their derivatives, shape (parameters,).
     bounds
-        Lowest and highest values.
+        Lowest and highest values, shape (parameters,) each.
     expected
         Misfit of noise alone.
 
     Returns
     -------
     Minimum
-        Where no step gains any more.
+        Values from which no move gains enough to continue.
     """
     low, high = bounds
-    here = np.clip(start, low, high)
-    left = residual(here)
-    misfit = space.misfit(left)
-    normal = np.eye(len(here))
-    wide, scale = 1.0, np.ones(len(here))
+    values = np.clip(start, low, high)
+    current = residual(values)
+    misfit = space.misfit(current)
+    normal = np.eye(len(values))
+    widening, shortening = 1.0, np.ones(len(values))
     for _ in range(ITERATIONS):
-        taken = wide * scale
-        jacobian = take_derivatives(residual, here, left, taken * steps, high) / taken
-        scale = shorten(jacobian, misfit)
-        normal, gradient = space.normal_equations(jacobian, left)
+        factors = widening * shortening
+        jacobian = take_derivatives(residual, values, current, factors * steps, high) / factors
+        # The responses just taken shorten the steps of the next iteration.
+        shortening = shorten(jacobian, misfit)
+        normal, gradient = space.normal_equations(jacobian, current)
+        # The constant keeps the matrix regular where a parameter has no effect.
         damped = normal + np.diag(DAMPING * np.diag(normal) + 1e-12)
         move = -np.linalg.solve(damped, gradient)
-        enough, gained = max(GAINED, SHARE * (misfit - expected)), 0.0
+        enough, gained = max(LEAST_GAIN, LEAST_GAIN_SHARE * (misfit - expected)), 0.0
+        # A quadratic misfit would fall by -g'm; a smaller promise is not worth a prediction.
         if -float(gradient @ move) >= enough:
-            for part in PARTS:
-                there = np.clip(here + part * move * steps, low, high)
-                tried = residual(there)
+            for share in MOVE_SHARES:
+                moved = np.clip(values + share * move * steps, low, high)
+                tried = residual(moved)
                 if (value := space.misfit(tried)) < misfit:
                     gained = misfit - value
-                    here, left, misfit = there, tried, value
+                    values, current, misfit = moved, tried, value
                     break
         if gained < enough:
-            if wide == WIDEST or is_sufficient(misfit, expected):
+            if widening == WIDENING or is_sufficient(misfit, expected):
                 break
-            wide = WIDEST
+            widening = WIDENING
+    # The covariance of least squares with unit variance is the inverse of the normal matrix.
     widths = np.sqrt(np.maximum(np.diag(np.linalg.pinv(normal)), 0.0)) * steps
-    return Minimum(here, misfit, widths)
+    return Minimum(values, misfit, widths)
 
 
-def is_sufficient(misfit: float, expected: float, enough: float = WIDENED) -> bool:
-    """Whether a fit leaves about what noise does, so that no closer one need be looked for.
+def is_sufficient(misfit: float, expected: float, ratio: float = SUFFICIENT_MISFIT) -> bool:
+    """Return whether a misfit is about that of noise, so that no closer fit is needed.
 
-    One that leaves much less shows that the expected noise was too large; closer ones still matter.
+    A much smaller misfit shows that the noise was overestimated. Closer fits then still matter.
+
+    Parameters
+    ----------
+    misfit, expected
+        Chi-square of the fit and of noise alone.
+    ratio
+        Ratio of both below which the fit is close enough.
+
+    Returns
+    -------
+    bool
+        True if the misfit is below `ratio` and the noise not overestimated.
     """
-    return OVERESTIMATED * expected < misfit < enough * expected
+    return OVERESTIMATED * expected < misfit < ratio * expected
 
 
 def shorten(jacobian: Array, misfit: float) -> Array:
-    """Shorten the steps of derivatives that change more than is left of the residual.
+    """Return by how much the steps of derivatives should be shortened.
 
-    A response to such a step is a secant far from the tangent.
+    A step that changes more than the residual itself gives a secant far from the tangent.
 
     Parameters
     ----------
@@ -131,33 +162,36 @@ def shorten(jacobian: Array, misfit: float) -> Array:
         Share of each step that should be taken, at most 1, shape (parameters,).
     """
     power = np.sum(jacobian**2, axis=0)
-    least = RESPONSE * misfit + SHORTEST**2 * power
+    least = LARGEST_RESPONSE * misfit + SHORTEST_STEP**2 * power
+    # The power of a response is quadratic in its step.
     return np.asarray(np.sqrt(least / np.maximum(power, least)))
 
 
 def take_derivatives(
-    residual: Callable[[Array], Array], here: Array, left: Array, steps: Array, high: Array
+    residual: Callable[[Array], Array], values: Array, current: Array, steps: Array, high: Array
 ) -> Array:
-    """What a step of each parameter changes.
+    """Return the change of a residual for a step of each parameter, by one-sided differences.
 
     Parameters
     ----------
     residual
-        Of values, shape (parameters,).
-    here, left
-        Values, and what they leave.
-    steps, high
-        How far each is moved, upwards where that is not beyond its highest value.
+        Function of the values, shape (parameters,).
+    values, current
+        Values, and the residual at them.
+    steps
+        Step of each parameter, shape (parameters,).
+    high
+        Highest values. A step that would exceed its highest value is taken downwards.
 
     Returns
     -------
     array
-        Shape (size, parameters).
+        Change per step, shape (size, parameters).
     """
     columns = []
     for number, step in enumerate(steps):
-        sign = 1.0 if here[number] + step <= high[number] else -1.0
-        beside = here.copy()
-        beside[number] += sign * step
-        columns.append(sign * (residual(beside) - left))
+        sign = 1.0 if values[number] + step <= high[number] else -1.0
+        shifted = values.copy()
+        shifted[number] += sign * step
+        columns.append(sign * (residual(shifted) - current))
     return np.stack(columns, axis=1)

@@ -1,4 +1,9 @@
-"""Whether several estimates of one parameter agree, and what their differences go with."""
+"""Homogeneity of several estimates of one parameter, and trends that explain their differences.
+
+With estimates x_i, standard errors s_i, weights 1 / s_i^2 and the weighted mean m, Cochran's
+statistic is Q = sum((x_i - m)^2 / s_i^2). A weighted straight line over a covariate lowers it by
+slope^2 times the weighted power of the centred covariate.
+"""
 
 from __future__ import annotations
 
@@ -11,13 +16,22 @@ from scipy.special import fdtrc
 from rigtwin.numerics.arrays import Array
 
 FEWEST = 4
-"""Recordings from which a trend can be named: of three, one in common with every line is left."""
+"""Minimum number of recordings for a trend: a line through three leaves one degree of freedom."""
 
 
 @dataclass(frozen=True)
 class Homogeneity:
-    """Cochran's test. mean: weighted; statistic: Q = Σ (value − mean)² / width²; probability: of
-    one as large if nothing differs."""
+    """Result of Cochran's test.
+
+    Attributes
+    ----------
+    mean
+        Weighted mean of the estimates.
+    statistic
+        Cochran's Q.
+    probability
+        Probability of a Q at least as large if all estimates agree.
+    """
 
     mean: float
     statistic: float
@@ -25,7 +39,7 @@ class Homogeneity:
 
 
 def check_homogeneity(values: Array, widths: Array, freedom: float) -> Homogeneity:
-    """Whether estimates agree.
+    """Test whether estimates agree.
 
     Parameters
     ----------
@@ -37,47 +51,61 @@ def check_homogeneity(values: Array, widths: Array, freedom: float) -> Homogenei
     Returns
     -------
     Homogeneity
-        Cochran's Q over its degrees of freedom, held against an F distribution as the standard
-        errors are themselves estimates [W. G. Cochran, Biometrics 10 (1954) 101].
+        Cochran's Q with its probability [W. G. Cochran, Biometrics 10 (1954) 101].
     """
     weights = 1.0 / np.maximum(widths, 1e-300) ** 2
     mean = float(weights @ values / weights.sum())
     statistic = float(weights @ (values - mean) ** 2)
     among = len(values) - 1
+    # The standard errors are estimates themselves, so that Q over its degrees of freedom has an F
+    # distribution and not a chi-square distribution.
     return Homogeneity(mean, statistic, float(fdtrc(among, freedom, statistic / among)))
 
 
 def correct(probabilities: Sequence[float]) -> list[float]:
-    """Probabilities corrected for how many there are, after Holm.
+    """Correct probabilities for the number of tests, by Holm's method.
 
     Parameters
     ----------
     probabilities
-        Of single tests.
+        Probabilities of single tests.
 
     Returns
     -------
     list of float
-        In the same order, 1 at most [S. Holm, Scand. J. Stat. 6 (1979) 65].
+        Corrected probabilities in the same order, at most 1 [S. Holm, Scand. J. Stat. 6 (1979) 65].
     """
     order = np.argsort(probabilities)
-    found, least = [1.0] * len(order), 0.0
+    corrected, least = [1.0] * len(order), 0.0
     for rank, place in enumerate(order):
+        # Corrected probabilities must rise in the order of the uncorrected ones.
         least = max(least, min((len(order) - rank) * probabilities[place], 1.0))
-        found[place] = least
-    return found
+        corrected[place] = least
+    return corrected
 
 
 @dataclass(frozen=True)
 class Trend:
-    """What differences between recordings go with. name: the quantity; slope: of the parameter
-    with it, in its unit by the quantity's; explains: share of Q; left: Q beside it; probability:
-    of so much left if that is all."""
+    """Weighted straight line of a parameter over a covariate.
+
+    Attributes
+    ----------
+    name
+        Name of the covariate.
+    slope
+        Slope of the parameter, in its unit per unit of the covariate.
+    explains
+        Share of Q that the line explains.
+    remaining
+        Q about the line.
+    probability
+        Probability of a Q at least as large about the line if the line is right.
+    """
 
     name: str
     slope: float
     explains: float
-    left: float
+    remaining: float
     probability: float
 
 
@@ -87,63 +115,67 @@ def fit_trends(
     covariates: Mapping[str, Array],
     freedom: float,
 ) -> list[Trend]:
-    """Weighted straight lines through estimates, over each quantity.
+    """Fit weighted straight lines through estimates over each covariate.
 
     Parameters
     ----------
     values, widths
         Estimates and their standard errors, shape (recordings,).
     covariates
-        Quantity → its value in each recording.
+        Name of the covariate → its value in each recording, shape (recordings,).
     freedom
-        Degrees of freedom of each standard error.
+        Degrees of freedom that each standard error was estimated with.
 
     Returns
     -------
     list of Trend
-        What explains most first; none of a quantity that does not differ.
+        Trends, the best first. Covariates that hardly differ between recordings are omitted.
     """
     whole = check_homogeneity(values, widths, freedom)
     weights = 1.0 / np.maximum(widths, 1e-300) ** 2
-    found = []
+    trends = []
     for name, covariate in covariates.items():
         centred = covariate - weights @ covariate / weights.sum()
         power = float(weights @ centred**2)
+        # A slope over a covariate that hardly varies would extrapolate.
         if np.ptp(covariate) <= 0.02 * np.max(np.abs(covariate)) or power == 0.0:
             continue
         slope = float(weights @ (centred * values)) / power
-        left = max(whole.statistic - slope**2 * power, 0.0)
-        remaining = len(values) - 2
-        probability = float(fdtrc(remaining, freedom, left / remaining)) if remaining else 1.0
-        explains = 1.0 - left / max(whole.statistic, 1e-300)
-        found.append(Trend(name, slope, explains, left, probability))
-    return sorted(found, key=lambda each: each.left)
+        remaining = max(whole.statistic - slope**2 * power, 0.0)
+        # The line uses two degrees of freedom.
+        among = len(values) - 2
+        probability = float(fdtrc(among, freedom, remaining / among)) if among else 1.0
+        explains = 1.0 - remaining / max(whole.statistic, 1e-300)
+        trends.append(Trend(name, slope, explains, remaining, probability))
+    return sorted(trends, key=lambda trend: trend.remaining)
 
 
 def name_trends(
     trends: Sequence[Trend], recordings: int, enough: float, clear: float
 ) -> tuple[tuple[Trend, ...], bool]:
-    """The quantities that a difference may go with.
+    """Return the trends that may explain a difference.
 
     Parameters
     ----------
     trends
-        What explains most first.
+        Trends, the best first.
     recordings
-        Their number.
+        Number of recordings.
     enough
-        Share of Q that one must explain.
+        Share of Q that a trend must explain.
     clear
-        Times what the best leaves that every other must leave for the best to be named alone.
+        Factor by which every other trend must leave more than the best for the best to be named
+        alone.
 
     Returns
     -------
     tuple
-        Those that may be it, and whether the first is named.
+        Possible trends, and whether the first one is named.
     """
-    likely = [each for each in trends if each.explains >= enough]
+    likely = [trend for trend in trends if trend.explains >= enough]
     if not likely:
         return (), False
-    least = max(likely[0].left, recordings - 2.0)
-    rivals = [each for each in likely if each.left <= clear * least]
+    # Q about the right line is about its degrees of freedom; less is chance.
+    least = max(likely[0].remaining, recordings - 2.0)
+    rivals = [trend for trend in likely if trend.remaining <= clear * least]
     return tuple(rivals), len(rivals) == 1 and recordings >= FEWEST

@@ -295,7 +295,7 @@ def _find_covariance(fitter: Fitter, fit: Fit) -> Array:
     rest = residual(here)
     low, high = fitter.bounds(fit.effects)
     jacobian = take_derivatives(residual, here, rest, steps, high)
-    normal, _ = fitter.space.beside(fit.effects).normal_equations(jacobian, rest)
+    normal, _ = fitter.space.without_replaced(fit.effects).normal_equations(jacobian, rest)
     excess = max(fit.misfit / evidence.expected, 1.0)
     return _invert(normal, steps, high - low) * excess
 

@@ -131,7 +131,7 @@ def leftovers(
         noise = float(evidence.lines[0].noise[number])
         typical = rms(np.concatenate([recorded.measured[number] for recorded in evidence.lines]))
         if levels[name] < max(
-            thresholds.left_over * noise, evidence.machine.form_of(row) * typical
+            thresholds.localisation_ratio * noise, evidence.machine.form_of(row) * typical
         ):
             continue
         # `locate` takes all rows: the others are set to zero so that this one is chosen.

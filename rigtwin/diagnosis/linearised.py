@@ -1,5 +1,10 @@
-"""A fit's residual, linear in the parameters of its effects: what the fit would leave without some
-of them, at the price of one Jacobian."""
+"""Linearised fits: the misfit of a fit without some of its effects, from a single jacobian.
+
+With the normal matrix N and gradient g at the fit, setting some parameters back by m_1 and
+refitting the others moves these by
+
+    m_2 = -N_22^-1 (g_2 + N_21 m_1).
+"""
 
 from __future__ import annotations
 
@@ -14,29 +19,37 @@ from rigtwin.diagnosis.gauss_newton import DAMPING, take_derivatives
 from rigtwin.numerics.arrays import Array
 
 Reduced = tuple[float, tuple[Effect, ...], Values]
-"""Misfit, effects and values of a fit with fewer effects."""
+"""Misfit, remaining effects and their values after effects are left out."""
 
 
 class Linearised:
-    """A fit's residual, linear in the parameters of its effects."""
+    """Residual of a fit, linear in the parameters of its effects.
+
+    Parameters
+    ----------
+    fitter
+        Fitter of the evidence.
+    fit
+        Fit about which the residual is linearised.
+    """
 
     def __init__(self, fitter: Fitter, fit: Fit) -> None:
         self._fitter, self._fit = fitter, fit
         self._sizes = [len(effect.kind.parameters) for effect in fit.effects]
         self._owner = np.repeat(np.arange(len(self._sizes)), self._sizes)
         self._steps = np.concatenate([fitter.starts(effect).steps for effect in fit.effects])
-        self._here = np.concatenate([np.asarray(values, float) for values in fit.values])
+        self._values = np.concatenate([np.asarray(values, float) for values in fit.values])
         self._bounds = fitter.bounds(fit.effects)
 
         def residual(vector: Array) -> Array:
             plant = with_values(fitter.plant, fit.effects, self._split(vector))
             return fitter.evidence.residual(plant)
 
-        self._left = residual(self._here)
+        self._residual = residual(self._values)
         self._jacobian = take_derivatives(
-            residual, self._here, self._left, self._steps, self._bounds[1]
+            residual, self._values, self._residual, self._steps, self._bounds[1]
         )
-        normal, self._gradient = fitter.space.normal_equations(self._jacobian, self._left)
+        normal, self._gradient = fitter.space.normal_equations(self._jacobian, self._residual)
         self._normal = normal + np.diag(DAMPING * np.diag(normal) + 1e-12)
 
     def _split(self, vector: Array) -> Values:
@@ -44,53 +57,55 @@ class Linearised:
         return tuple(tuple(part.tolist()) for part in np.split(vector, cuts))
 
     def leave_out_each(self) -> list[Reduced]:
-        """Leave out each effect in turn, and take the others anew.
+        """Leave out each effect in turn, and refit the others.
 
         Returns
         -------
         list of tuples
-            Misfit, the other effects and their values, the least misfit first; without those in
-            which an effect lacks what it acts through.
+            Misfit, remaining effects and their values, the least misfit first. Sets in which an
+            effect lacks the dry friction that it acts through are omitted.
         """
         return self._leave_out(range(len(self._fit.effects)))
 
     def eliminate(self) -> list[Reduced]:
-        """Leave out one effect after another, each time the one that is missed least.
+        """Leave out one effect after another, always the one whose loss raises the misfit least.
 
         Returns
         -------
         list of tuples
-            Misfit, the remaining effects and their values, the largest set first.
+            Misfit, remaining effects and their values, the largest set first.
         """
         remaining: Sequence[int] = range(len(self._fit.effects))
-        found: list[Reduced] = []
+        path: list[Reduced] = []
         while len(remaining) > 1 and (fewer := self._leave_out(remaining)):
-            found.append(fewer[0])
-            left = set(fewer[0][1])
-            remaining = [n for n in remaining if self._fit.effects[n] in left]
-        return found
+            path.append(fewer[0])
+            effects = set(fewer[0][1])
+            remaining = [n for n in remaining if self._fit.effects[n] in effects]
+        return path
 
     def _leave_out(self, remaining: Sequence[int]) -> list[Reduced]:
-        found = []
-        for out in remaining:
-            rest = [number for number in remaining if number != out]
-            effects = tuple(self._fit.effects[number] for number in rest)
+        """Leave out each of the remaining effects, given by their numbers, in turn."""
+        reduced = []
+        for omitted in remaining:
+            subset = [number for number in remaining if number != omitted]
+            effects = tuple(self._fit.effects[number] for number in subset)
             if is_possible(effects, self._fitter.plant):
-                misfit, values = self._keep_only(rest)
-                found.append((misfit, effects, values))
-        return sorted(found, key=lambda each: each[0])
+                misfit, values = self._keep_only(subset)
+                reduced.append((misfit, effects, values))
+        return sorted(reduced, key=lambda result: result[0])
 
-    def _keep_only(self, rest: Sequence[int]) -> tuple[float, Values]:
-        move = np.zeros(len(self._here))
+    def _keep_only(self, subset: Sequence[int]) -> tuple[float, Values]:
+        """Return misfit and values when only a subset of the effects is kept and refitted."""
+        move = np.zeros(len(self._values))
         for number, effect in enumerate(self._fit.effects):
-            if number not in rest:
-                # Of an effect that is not there only the magnitude says so.
+            if number not in subset:
+                # An effect is absent if its magnitude is nominal; its shape is then irrelevant.
                 place = int(np.nonzero(self._owner == number)[0][0])
                 nominal = effect.nominal(self._fitter.plant)[effect.kind.parameters[0]]
-                move[place] = (nominal - self._here[place]) / self._steps[place]
-        free = np.isin(self._owner, rest)
+                move[place] = (nominal - self._values[place]) / self._steps[place]
+        free = np.isin(self._owner, subset)
         right = self._gradient[free] + self._normal[np.ix_(free, ~free)] @ move[~free]
         move[free] = -np.linalg.solve(self._normal[np.ix_(free, free)], right)
-        misfit = self._fitter.space.misfit(self._left + self._jacobian @ move)
-        values = self._split(np.clip(self._here + move * self._steps, *self._bounds))
-        return misfit, tuple(values[number] for number in rest)
+        misfit = self._fitter.space.misfit(self._residual + self._jacobian @ move)
+        values = self._split(np.clip(self._values + move * self._steps, *self._bounds))
+        return misfit, tuple(values[number] for number in subset)

@@ -1,16 +1,21 @@
-"""Weights of hypotheses, and what follows from them for each effect.
+"""Posterior weights of hypotheses, and the inclusion probability of every effect.
 
-The score of a hypothesis is its log predictive density on data left out of its fit [Vehtari,
-Gelman, Gabry 2017], less the price of its parameters. Let a signal have N samples, of which n are
-independent, and let its held-out residual have the power q in units of noise and declared error.
-Then
+The score of a hypothesis is its log predictive density on data held out of its fit [Vehtari,
+Gelman, Gabry, Stat. Comput. 27 (2017) 1413], less the price of its effects. Let a band of a signal
+have N samples, of which n are independent, and let its held-out residual have the power q in units
+of noise and declared error. Then
 
     -2 ln p = k n q                              for q <= 1,
-    -2 ln p = k n + n ln(1 + (q - 1) N / n)      for q > 1:
+    -2 ln p = k n + n ln(1 + (q - 1) N / n)      for q > 1.
 
-a Gaussian whose variance is that of the noise, and of a discrepancy of unknown scale in n of the
-samples where more is left [Kennedy, O'Hagan 2001]. Weights are proportional to exp(score / temper),
-as in pseudo-BMA [Yao, Vehtari, Simpson, Gelman 2018]. All of it is continuous in the data.
+That is a Gaussian with the variance of the noise, and where the residual is larger, of a
+discrepancy of unknown scale in n of the samples [Kennedy, O'Hagan, J. R. Stat. Soc. B 63 (2001)
+425]. The factor k < 1 discounts gains within noise and declared error. The weights are
+
+    w_i = exp(score_i / T) / sum_j exp(score_j / T),
+
+as in pseudo-BMA [Yao, Vehtari, Simpson, Gelman, Bayesian Anal. 13 (2018) 917]. The temper T > 1
+accounts for correlated samples. The weights are continuous in the data.
 """
 
 from __future__ import annotations
@@ -31,22 +36,22 @@ from rigtwin.diagnosis.thresholds import Thresholds
 from rigtwin.numerics.arrays import Array
 
 
-def misfit_of(levels: Array, pieces: Array, samples: Array, within: float) -> float:
-    """Return minus twice the log predictive density; see the module's equation.
+def deviance(levels: Array, pieces: Array, samples: Array, within: float) -> float:
+    """Return minus twice the log predictive density, by the module's equation.
 
     Parameters
     ----------
     levels
         Held-out power q of each band of each signal.
     pieces, samples
-        Numbers n and N, of the same shape.
+        Numbers n of independent samples and N of samples, of the same shape.
     within
-        Factor k.
+        Factor k of gains within noise and declared error.
 
     Returns
     -------
     float
-        The sum over all bands.
+        Sum over all bands, dimensionless.
     """
     narrow = samples / np.maximum(pieces, 1e-300)
     excess = np.maximum(levels - 1.0, 0.0)
@@ -55,25 +60,61 @@ def misfit_of(levels: Array, pieces: Array, samples: Array, within: float) -> fl
 
 @dataclass(frozen=True)
 class Weighted:
-    """A hypothesis and its weight among all that were tried."""
+    """A hypothesis and its weight among all hypotheses that were scored.
+
+    Attributes
+    ----------
+    scored
+        Cross-validated fit of the hypothesis.
+    cost
+        Minus its score, nats.
+    weight
+        Posterior weight, 0 to 1. The weights of all hypotheses add up to 1.
+    """
 
     scored: Scored
     cost: float
     weight: float
 
 
-class Posterior:
-    """All hypotheses that were tried, the one of least cost first."""
+class HypothesisPosterior:
+    """Weights of all hypotheses that were scored.
+
+    Parameters
+    ----------
+    pool
+        Scored fits. The fit without effects is one of them.
+    fitter
+        Fitter of the evidence.
+    candidates
+        Number of effects that are searched.
+    thresholds
+        Thresholds and prices of the score.
+
+    Attributes
+    ----------
+    empty
+        Scored fit without effects.
+    discrepancy
+        Share of the independent samples that noise and declared error do not explain, 0 to 1.
+    temper
+        Divisor T of differences of the score.
+    prices
+        Prices of effects at this discrepancy.
+    """
 
     def __init__(
         self, pool: Sequence[Scored], fitter: Fitter, candidates: int, thresholds: Thresholds
     ) -> None:
-        """pool: scored fits, the empty one among them; candidates: number of effects searched."""
         self._fitter, self._thresholds, self._pool = fitter, thresholds, list(pool)
-        self.empty = next(each for each in self._pool if not each.fit.effects)
-        # What predicts held-out data best says how much is left, in how many samples, and how much
-        # noise a plant like this carries. All hypotheses are judged by that alike.
-        reference = min(self._pool, key=lambda each: float(np.sum(each.levels * each.samples)))
+        self.empty = next(scored for scored in self._pool if not scored.fit.effects)
+        # The hypothesis that predicts held-out data best fixes the discrepancy, the number of
+        # independent samples and the propagated noise. All hypotheses are judged by the same
+        # numbers: with its own n, a hypothesis with a more correlated residual would pay less
+        # for it.
+        reference = min(
+            self._pool, key=lambda scored: float(np.sum(scored.levels * scored.samples))
+        )
         self._noise, self._pieces = 1.0 + reference.excess, reference.pieces
         samples, signals = float(np.sum(self._pieces)), self._pieces.shape[1]
         beyond = 1.0 - 1.0 / np.maximum(self.levels(reference), 1.0)
@@ -85,109 +126,171 @@ class Posterior:
 
     @property
     def nominal(self) -> Plant:
-        """The plant without any effect."""
+        """Plant without any effect."""
         return self._fitter.plant
 
     def levels(self, scored: Scored) -> Array:
-        """Power of a held-out residual in units of noise and declared error at the reference."""
+        """Return the power of a held-out residual, in units of noise and declared error.
+
+        The noise is that propagated at the reference hypothesis.
+
+        Parameters
+        ----------
+        scored
+            Cross-validated fit.
+
+        Returns
+        -------
+        array
+            Power q, shape (recordings, signals, bands).
+        """
         return scored.levels / self._noise
 
     def loss(self, scored: Scored) -> float:
-        """Minus the log predictive density, nats."""
-        return self._density(self.levels(scored), scored)
+        """Return minus the log predictive density of a hypothesis, nats."""
+        return self._loss_at(self.levels(scored), scored)
 
-    def _density(self, levels: Array, scored: Scored) -> float:
-        """Minus the log predictive density of a hypothesis that leaves certain levels."""
-        return 0.5 * misfit_of(levels, self._pieces, scored.samples, self._thresholds.within)
+    def _loss_at(self, levels: Array, scored: Scored) -> float:
+        """Return minus the log predictive density of a residual with the given powers, nats."""
+        within = self._thresholds.within_noise_weight
+        return 0.5 * deviance(levels, self._pieces, scored.samples, within)
 
     def cost(self, scored: Scored) -> float:
-        """Minus the score of a hypothesis, nats; infinite where a value stands at its bound."""
+        """Return minus the score of a hypothesis: its loss and the prices of its effects, nats.
+
+        A hypothesis that is held by a bound has an infinite cost.
+        """
         if scored.bounded:
             return math.inf
-        prices = sum(self.prices.of(effect) for effect in scored.fit.effects)
-        return self.loss(scored) + prices + self.prices.of_values(scored)
+        prices = sum(self.prices.price_effect(effect) for effect in scored.fit.effects)
+        return self.loss(scored) + prices + self.prices.price_values(scored)
 
     @cached_property
     def ranking(self) -> tuple[Weighted, ...]:
         """All hypotheses with their weights, the best first."""
-        costs = [self.cost(each) for each in self._pool]
+        costs = [self.cost(scored) for scored in self._pool]
         least = min(costs)
+        # Costs are taken relative to the least one, and capped, so that exp cannot underflow to an
+        # empty sum.
         raw = [math.exp(-min((cost - least) / self.temper, 700.0)) for cost in costs]
         total = sum(raw)
         weighted = [
-            Weighted(each, cost, weight / total)
-            for each, cost, weight in zip(self._pool, costs, raw, strict=True)
+            Weighted(scored, cost, weight / total)
+            for scored, cost, weight in zip(self._pool, costs, raw, strict=True)
         ]
-        return tuple(sorted(weighted, key=lambda each: each.cost))
+        return tuple(sorted(weighted, key=lambda hypothesis: hypothesis.cost))
 
     @property
     def best(self) -> Scored:
-        """The hypothesis of least cost."""
+        """Hypothesis of least cost."""
         return self.ranking[0].scored
 
     def inclusion(self, effect: Effect) -> float:
-        """Probability of an effect: the weight of all hypotheses that contain it."""
-        return sum(each.weight for each in self.ranking if effect in each.scored.fit.effects)
+        """Return the probability of an effect: the weight of all hypotheses that contain it."""
+        return sum(
+            hypothesis.weight
+            for hypothesis in self.ranking
+            if effect in hypothesis.scored.fit.effects
+        )
 
     def margin(self, effect: Effect) -> float:
-        """Nats by which the best hypothesis without an effect and its rivals is worse."""
-        out = {effect, *self.rivals(effect)}
-        costs = [each.cost for each in self.ranking if out.isdisjoint(each.scored.fit.effects)]
+        """Return the nats by which the best hypothesis without an effect and its rivals is worse.
+
+        Parameters
+        ----------
+        effect
+            Effect of the best hypothesis.
+
+        Returns
+        -------
+        float
+            Difference of the costs, at most 1e6.
+        """
+        excluded = {effect, *self.rivals(effect)}
+        costs = [
+            hypothesis.cost
+            for hypothesis in self.ranking
+            if excluded.isdisjoint(hypothesis.scored.fit.effects)
+        ]
         return min(min(costs, default=math.inf) - self.ranking[0].cost, 1e6)
 
     def spread(self, effect: Effect) -> tuple[float, ...]:
-        """Standard deviation of the values of an effect over all hypotheses that contain it, about
-        those of the best one: how uncertain a value is because the hypothesis is."""
+        """Return the standard deviation of an effect's values over all hypotheses with it.
+
+        It is taken about the values of the best hypothesis. It adds the uncertainty of the
+        hypothesis to that of the fit.
+
+        Parameters
+        ----------
+        effect
+            Effect of the best hypothesis.
+
+        Returns
+        -------
+        tuple of float
+            Standard deviation of each value, in the units of the effect's parameters.
+        """
         number = self.best.fit.effects.index(effect)
-        own = np.array(self.best.fit.values[number])
-        variance, weight = np.zeros(len(own)), 0.0
-        for each in self.ranking:
-            if effect in each.scored.fit.effects:
-                values = each.scored.fit.values[each.scored.fit.effects.index(effect)]
-                variance += each.weight * (np.array(values) - own) ** 2
-                weight += each.weight
+        chosen = np.array(self.best.fit.values[number])
+        variance, weight = np.zeros(len(chosen)), 0.0
+        for hypothesis in self.ranking:
+            fit = hypothesis.scored.fit
+            if effect in fit.effects:
+                values = fit.values[fit.effects.index(effect)]
+                variance += hypothesis.weight * (np.array(values) - chosen) ** 2
+                weight += hypothesis.weight
         return tuple(np.sqrt(variance / weight).tolist())
 
     def rivals(self, effect: Effect) -> tuple[Effect, ...]:
-        """Effects that the data cannot tell from one of the best hypothesis."""
-        rest = set(self.best.fit.effects) - {effect}
-        top = self.ranking[0].weight
-        found = []
-        for each in self.ranking:
-            others = set(each.scored.fit.effects) - rest
-            if each.weight < self._thresholds.member * top or len(others) != 1:
+        """Return the effects that the data cannot tell from one of the best hypothesis.
+
+        A rival takes the effect's place beside all its other effects, in a hypothesis of
+        sufficient weight.
+        """
+        common = set(self.best.fit.effects) - {effect}
+        least = self._thresholds.rival_weight * self.ranking[0].weight
+        rivals = []
+        for hypothesis in self.ranking:
+            members = set(hypothesis.scored.fit.effects)
+            exchanged = members - common
+            if hypothesis.weight < least or len(exchanged) != 1:
                 continue
-            (other,) = others
-            if other != effect and rest <= set(each.scored.fit.effects):
-                found.append(other)
-        return tuple(dict.fromkeys(found))
+            (candidate,) = exchanged
+            if candidate != effect and common <= members:
+                rivals.append(candidate)
+        return tuple(dict.fromkeys(rivals))
 
     def excess(self, scored: Scored) -> Array:
-        """Power beyond noise and declared error, shape (signals,)."""
+        """Return the power beyond noise and declared error of each signal, shape (signals,)."""
         beyond = np.maximum(self.levels(scored) - 1.0, 0.0)
         return np.asarray(np.sum(scored.samples * beyond, axis=(0, 2)))
 
     def closes(self, scored: Scored) -> float:
-        """Share of the gap's amplitude beyond noise and declared error that is closed."""
+        """Return the share of the gap's amplitude beyond noise and declared error that a hypothesis
+        closes."""
         before, after = self.excess(self.empty).sum(), self.excess(scored).sum()
         return 1.0 - math.sqrt(after / before) if before > 0.0 else 0.0
 
     @property
     def unexplained(self) -> float:
-        """Nats that the best hypothesis loses to one that leaves noise and declared error, beyond
-        what chance makes of noise."""
+        """Log predictive density that the best hypothesis loses to a perfect one, nats.
+
+        A perfect hypothesis leaves noise and declared error in every band. Excesses that chance
+        makes of noise do not count.
+        """
         levels = self.levels(self.best)
-        chance = self._thresholds.chance * np.sqrt(2.0 / np.maximum(self._pieces, 1.0))
+        # The mean square of n samples of unit variance has the standard deviation sqrt(2 / n).
+        chance = self._thresholds.chance_deviations * np.sqrt(2.0 / np.maximum(self._pieces, 1.0))
         within = np.minimum(levels, 1.0)
         beyond = within + np.maximum(levels - within - chance, 0.0)
-        return self._density(beyond, self.best) - self._density(within, self.best)
+        return self._loss_at(beyond, self.best) - self._loss_at(within, self.best)
 
     @property
-    def leaves_something(self) -> bool:
-        """Whether the rest of the best hypothesis could pay for one more effect."""
+    def has_unexplained_residual(self) -> bool:
+        """Whether the residual of the best hypothesis could pay for one more effect."""
         return self.unexplained > self.prices.ordinary
 
     @property
-    def rest(self) -> float:
-        """Excess of the best hypothesis, as a share of noise and declared error."""
+    def residual_excess(self) -> float:
+        """Power of the best hypothesis beyond noise and declared error, as a share of both."""
         return float(self.excess(self.best).sum() / np.sum(self.best.samples))

@@ -1,9 +1,15 @@
-"""What a hypothesis costs besides its residual: the prior of its effects, in nats.
+"""Prices of effects: the prior of a hypothesis, in nats.
 
-Every effect has a price, an Occam factor that grows with the rest that nothing explains: a
-parameter absorbs some of any rest, also where it means nothing. Values that are badly known, that
-undo each other, or that are no more than a declared tolerance or model error cost more. All prices
-are continuous in the values.
+Let d be the discrepancy, the share of the n independent samples that nothing explains, and m the
+number of signals. An effect with p parameters costs
+
+    (1 - d) (occam_quiet + materiality n) + d occam_discrepant + ln(candidates)
+    + p d discrepancy_price n / m + (p - 1) shape_price,
+
+an Occam factor that grows with the residual that nothing explains, as a parameter absorbs some of
+any such residual. The logarithm accounts for the number of effects that were tried. Rare effects,
+values that are poorly determined or cancel each other, and changes within a declared tolerance or
+model error cost more. All prices are continuous in the values.
 """
 
 from __future__ import annotations
@@ -28,41 +34,45 @@ RARE = (
     "load_friction",
     "deadband_asymmetry",
 )
-"""Kinds that few machines have; the rest that dry friction at the same component leaves resembles
-them."""
+"""Kinds that few machines have. The residual that dry friction leaves at the same component
+resembles them."""
 CONTAINS_SIMPLER = ("two_lags", "mount", "deadband_asymmetry")
-"""Kinds that become a simpler one at the end of their range."""
-DOUBT = 0.5
-"""Parameters that such a kind costs besides its own."""
-NEAR = 0.25
-"""Standard errors within which the price of an unsteady value doubles where its interval holds the
+"""Kinds that become a simpler kind at an end of their range."""
+SIMPLER_PARAMETERS = 0.5
+"""Number of parameters that a kind containing a simpler one costs in addition."""
+NOMINAL_DISTANCE = 0.25
+"""Shortfall in standard errors at which the price of a value doubles once its interval contains the
 nominal value."""
 
 
 def is_rare(effect: Effect) -> bool:
-    """Whether few machines have it; the gain of a sensor is one such effect, its zero is not."""
+    """Return whether few machines have an effect.
+
+    The gain of a sensor is rare and its zero is not. A kind of a component without dry friction is
+    never rare.
+    """
     if measures(effect.of()):
         return effect.kind.name != "offset"
     return effect.kind.name in RARE and "coulomb" in fields(effect.of)
 
 
 class Prices:
-    """Prices where a certain rest is left.
+    """Prices of effects at a given discrepancy.
 
     Parameters
     ----------
     fitter
         Fitter of the evidence.
     thresholds
-        Numbers that the prices are made of.
+        Thresholds that the prices are made of.
     candidates
-        Number of effects that were searched.
+        Number of effects that are searched.
     samples
         Number of independent samples of all signals.
     signals
         Number of signals.
     discrepancy
-        Share of the residual's samples that noise and declared error do not explain, 0 to 1.
+        Share of the independent samples that noise and declared error do not explain, 0 to 1.
     """
 
     def __init__(
@@ -77,86 +87,103 @@ class Prices:
         self._fitter, self._thresholds = fitter, thresholds
         self._signal_samples, self._discrepancy = samples / signals, discrepancy
         t = thresholds
-        self._first = (
+        self._effect_price = (
             (1.0 - discrepancy) * (t.occam_quiet + t.materiality * samples)
             + discrepancy * t.occam_discrepant
             + math.log(max(candidates, 1))
         )
-        self._each = discrepancy * t.discrepancy_price * self._signal_samples
+        self._parameter_price = discrepancy * t.discrepancy_price * self._signal_samples
         machine = fitter.evidence.machine
         self._form = float(np.mean([machine.form_of(row) for row in machine.rows]))
 
     @property
     def ordinary(self) -> float:
-        """Nats that an ordinary effect of one parameter must gain."""
-        return self._first + self._each
+        """Price of an ordinary effect of one parameter, nats."""
+        return self._effect_price + self._parameter_price
 
-    def of(self, effect: Effect) -> float:
-        """Nats that an effect must gain to be worth its parameters."""
+    def price_effect(self, effect: Effect) -> float:
+        """Return the gain that an effect must bring to be worth its parameters, nats."""
         t = self._thresholds
         count = float(len(effect.kind.parameters) - len(effect.kind.nuisances))
         starts = self._fitter.starts(effect)
         if starts.quadrature:
-            # Each pitch of a wave is a place of its own, and was looked at in two phases.
+            # Each pitch of a wave is a hypothesis of its own, and was tried at two phases.
             count += math.log2(len(starts.values) / 2)
         elif count == 1.0 and effect.kind.name in CONTAINS_SIMPLER:
-            count += DOUBT
-        price = self._first + count * self._each + (count - 1.0) * t.shape_price
+            count += SIMPLER_PARAMETERS
+        price = self._effect_price + count * self._parameter_price + (count - 1.0) * t.shape_price
         if is_rare(effect):
             price += t.rare_odds + self._discrepancy * t.rare_price * self._signal_samples
         return price
 
-    def of_values(self, scored: Scored) -> float:
-        """Nats that the values of a hypothesis cost beyond the prices of its effects."""
-        return self._undone(scored) + self._slight(scored) + self._uncertain(scored)
+    def price_values(self, scored: Scored) -> float:
+        """Return the price of a hypothesis' values beyond the prices of its effects, nats."""
+        return (
+            self._price_cancelling(scored)
+            + self._price_immaterial(scored)
+            + self._price_unsteady(scored)
+        )
 
-    def _undone(self, scored: Scored) -> float:
-        """Cost of pairs of effects that undo each other.
+    def _price_cancelling(self, scored: Scored) -> float:
+        """Return the price of pairs of effects that cancel each other.
 
-        What corrects a nominal value that is too high undoes nothing, so that only pairs count
-        which the nominal machine does not have.
+        Only pairs of effects that the nominal machine lacks count: a correction of a nominal value
+        may rightly oppose another effect.
         """
-        t, cost = self._thresholds, 0.0
-        new = [self._nominal(effect) == 0.0 for effect in scored.fit.effects]
-        for one in range(len(new)):
-            for other in range(one):
-                if new[one] and new[other]:
-                    lacking = (t.undone - scored.together[one, other]) / (0.5 * t.undone)
-                    cost += t.forbidding * float(np.clip(lacking, 0.0, 1.0))
-        return cost
+        t, price = self._thresholds, 0.0
+        absent = [self._nominal(effect) == 0.0 for effect in scored.fit.effects]
+        for first in range(len(absent)):
+            for second in range(first):
+                if absent[first] and absent[second]:
+                    joint = scored.together[first, second]
+                    # The price rises linearly from the threshold to its half.
+                    lacking = (t.cancelling_share - joint) / (0.5 * t.cancelling_share)
+                    price += t.prohibitive_price * float(np.clip(lacking, 0.0, 1.0))
+        return price
 
-    def _slight(self, scored: Scored) -> float:
-        """Cost of effects that account for less than the declared error, or for little though they
-        are rare."""
-        t, cost = self._thresholds, 0.0
+    def _price_immaterial(self, scored: Scored) -> float:
+        """Return the price of effects that account for too little of the signals.
+
+        Every effect should exceed the declared error where that is spread evenly; a rare effect
+        should account for a larger share.
+        """
+        t, price = self._thresholds, 0.0
         even = self._fitter.evidence.machine.prior.even
         for effect, share in zip(scored.fit.effects, scored.accounts, strict=True):
-            immaterial = float(np.clip(t.material - share / self._form, 0.0, 1.0))
-            cost += even * t.forbidding * immaterial
+            immaterial = float(np.clip(t.material_model_errors - share / self._form, 0.0, 1.0))
+            price += even * t.prohibitive_price * immaterial
             if is_rare(effect):
-                lacking = float(np.clip(1.0 - share / t.rare_share, 0.0, 1.0))
-                cost += self._discrepancy * lacking * t.rare_doubt * self._signal_samples
-        return cost
+                lacking = float(np.clip(1.0 - share / t.rare_amplitude_share, 0.0, 1.0))
+                doubt = self._discrepancy * lacking
+                price += doubt * t.rare_immaterial_price * self._signal_samples
+        return price
 
-    def _uncertain(self, scored: Scored) -> float:
-        """Cost of values that are badly known, or no more than a declared tolerance."""
-        t, evidence, cost = self._thresholds, self._fitter.evidence, 0.0
+    def _price_unsteady(self, scored: Scored) -> float:
+        """Return the price of values that are poorly determined or within a declared tolerance.
+
+        With z the standard errors between a magnitude and its nominal value, the price is
+        unsteady_price (4 - z)^2 for z < 4. It is steeper once the interval of 2.5 standard errors
+        contains the nominal value.
+        """
+        t, evidence, price = self._thresholds, self._fitter.evidence, 0.0
         for effect, values, widths in zip(
             scored.fit.effects, scored.fit.values, scored.widths, strict=True
         ):
-            off = abs(values[0] - self._nominal(effect))
-            sure = off / max(widths[0], 1e-300)
-            steep = 1.0 + (max(t.wider - sure, 0.0) / NEAR) ** 2
-            cost += t.unsteady * max(t.steady - sure, 0.0) ** 2 * steep
+            change = abs(values[0] - self._nominal(effect))
+            steadiness = change / max(widths[0], 1e-300)
+            shortfall = max(t.interval_half_width - steadiness, 0.0)
+            steep = 1.0 + (shortfall / NOMINAL_DISTANCE) ** 2
+            unsteady = max(t.steady_standard_errors - steadiness, 0.0)
+            price += t.unsteady_price * unsteady**2 * steep
             tolerance = evidence.machine.tolerance_of(effect.group, effect.kind.parameters[0])
             if tolerance is not None:
                 width = evidence.width(tolerance)
                 if tolerance.relative:
                     width = tolerance.half_width * abs(self._nominal(effect))
-                beyond = t.within_tolerance - off / max(width, 1e-300)
-                cost += t.forbidding * float(np.clip(beyond, 0.0, 1.0))
-        return cost
+                within = t.tolerance_half_widths - change / max(width, 1e-300)
+                price += t.prohibitive_price * float(np.clip(within, 0.0, 1.0))
+        return price
 
     def _nominal(self, effect: Effect) -> float:
-        """The nominal magnitude of an effect."""
+        """Return the nominal magnitude of an effect, in the unit of its first parameter."""
         return effect.nominal(self._fitter.plant)[effect.kind.parameters[0]]

@@ -1,5 +1,13 @@
-"""Which effects are worth a fit beside others, or in the place of one: by what they change, without
-fitting them."""
+"""Proposals of effects that are worth a fit, from their simulated responses alone.
+
+Let d be the whitened response to an effect beside a fit, r the residual of that fit, and both free
+of what the tolerances absorb. The share s of the response explains the chi-square
+
+    2 s d'r - s^2 d'd,
+
+which is largest at s = d'r / d'd. An effect is added for what it explains of r. It replaces an
+effect with the response e if the squared cosine (d'e)^2 / (d'd e'e) is large.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigtwin.components import Effect
-from rigtwin.diagnosis.fit import Fit, Values, clashes, is_possible, with_values
+from rigtwin.diagnosis.fit import Fit, Values, clashes, is_possible, leave_one_out, with_values
 from rigtwin.diagnosis.fitter import Fitter
 from rigtwin.diagnosis.space import Space
 from rigtwin.diagnosis.starts import LATE_BY_TIME
@@ -18,22 +26,34 @@ from rigtwin.diagnosis.threads import Threads
 from rigtwin.numerics.arrays import Array
 
 RESEMBLES = 0.6
-"""Share of an effect's response that another must be able to explain to be tried in its place."""
-SAME = 0.99999
-"""Cosine of two responses from which they are the same."""
-MOVED = 6
-"""Rank among all that resemble an effect up to which the same kind elsewhere is tried too."""
-
-
+"""Squared cosine of two responses from which one effect is tried in the place of the other."""
+IDENTICAL = 0.99999
+"""Cosine of two responses from which they count as identical."""
+ELSEWHERE = 6
+"""Rank among the resembling effects up to which the same kind at another component is tried."""
+LARGEST_SHARE = 3.0
+"""Largest share of a simulated response that a linear estimate uses."""
 LATE = ("lag", "delay", "two_lags", "resonance")
-"""Kinds that make a signal late, each in its own way."""
+"""Kinds that delay a signal."""
 
 
 @dataclass(frozen=True)
 class Proposal:
-    """Effects worth a fit. promised: the misfit that a linear estimate gives them; values: to start
-    from; space: tolerances; response: of the effect that is added, of unit length, shape
-    (size,)."""
+    """Effects that are worth a fit.
+
+    Attributes
+    ----------
+    promised
+        Misfit that the linear estimate gives the effects.
+    effects
+        Effects of the fit and the one that is added, last.
+    values
+        Starting values of each effect.
+    space
+        Tolerances about the fit.
+    response
+        Whitened response to the added effect, scaled to unit length, shape (size,).
+    """
 
     promised: float
     effects: tuple[Effect, ...]
@@ -45,30 +65,29 @@ class Proposal:
 def propose_additions(
     fitter: Fitter, first: Fit, effects: Sequence[Effect], least: float, threads: Threads
 ) -> list[Proposal]:
-    """Further effects beside a fit, by how well their responses at the nominal plant, or beside
-    it, resemble what it leaves.
+    """Propose effects to add to a fit, by what their responses explain of its residual.
 
     Parameters
     ----------
     fitter
-        Of the evidence.
+        Fitter of the evidence.
     first
-        The fit.
+        Fit that is extended.
     effects
-        Candidates, all fitted alone before.
+        Candidate effects, all of them screened.
     least
-        χ² that one must promise to explain.
+        Chi-square that an addition must promise to explain.
     threads
-        Work side by side.
+        Threads that simulate in parallel.
 
     Returns
     -------
     list of Proposal
-        In the order of the candidates.
+        Proposals in the order of the candidates.
     """
     space = Space(fitter.evidence, first.plant)
     residual = fitter.residual_at(first)
-    taken = space.misfit(residual)
+    current = space.misfit(residual)
 
     def propose(effect: Effect) -> Proposal | None:
         if clashes(effect, first.effects) or not is_possible(
@@ -76,47 +95,51 @@ def propose_additions(
         ):
             return None
         starts, responses = zip(*fitter.responses_beside(effect, first), strict=True)
-        # An effect that takes a tolerance's place is not what that tolerance may take up.
-        own = space.beside((effect,))
-        power, alike = own.strengths(np.stack(responses, axis=1).astype(np.float64), residual)
+        # An effect that replaces a tolerance must not be judged beside that tolerance.
+        reduced = space.without_replaced((effect,))
+        shapes = np.stack(responses, axis=1).astype(np.float64)
+        power, along = reduced.strengths(shapes, residual)
         power = np.maximum(power, 1e-300)
-        # A response may be too strong or too weak, but not the other way round.
-        share = np.clip(alike / power, 0.0, 3.0)
-        gains = 2.0 * share * alike - share**2 * power
+        # The share may correct the size of a response, but not its sign: a negative Coulomb
+        # friction, for example, is not the mirror image of a positive one.
+        share = np.clip(along / power, 0.0, LARGEST_SHARE)
+        gains = 2.0 * share * along - share**2 * power
         best = int(np.argmax(gains))
-        gain = float(gains[best]) - (own.misfit(residual) - taken)
+        # Giving up the replaced tolerance costs misfit, which the effect has to make up for.
+        gain = float(gains[best]) - (reduced.misfit(residual) - current)
         if gain <= least:
             return None
         promised = first.misfit - gain
         start = fitter.scale_start(effect, starts[best], float(share[best]))
         response = responses[best] / max(float(np.linalg.norm(responses[best])), 1e-30)
-        effects, values = (*first.effects, effect), (*first.values, *start)
-        return Proposal(promised, effects, values, space, response)
+        extended, values = (*first.effects, effect), (*first.values, *start)
+        return Proposal(promised, extended, values, space, response)
 
-    return [each for each in threads.spread(propose, effects) if each is not None]
+    proposals = threads.spread(propose, effects)
+    return [proposal for proposal in proposals if proposal is not None]
 
 
 def choose_distinct(proposals: Sequence[Proposal], count: int) -> list[Proposal]:
-    """Choose the proposals that promise most, none of which does the same as another.
+    """Choose the most promising proposals with distinct responses.
 
-    What does the same is tried in the place of what is found.
+    An effect with an identical response is tried later, as a replacement of the chosen one.
 
     Parameters
     ----------
     proposals
         Additions to one fit.
     count
-        How many to choose at most.
+        Largest number of proposals to choose.
 
     Returns
     -------
     list of Proposal
-        The most promising one first.
+        Chosen proposals, the most promising one first.
     """
     chosen: list[Proposal] = []
-    for proposal in sorted(proposals, key=lambda each: each.promised):
-        alike = (abs(float(proposal.response @ each.response)) for each in chosen)
-        if all(one < SAME for one in alike):
+    for proposal in sorted(proposals, key=lambda proposal: proposal.promised):
+        cosines = (abs(float(proposal.response @ member.response)) for member in chosen)
+        if all(cosine < IDENTICAL for cosine in cosines):
             chosen.append(proposal)
         if len(chosen) == count:
             break
@@ -126,86 +149,113 @@ def choose_distinct(proposals: Sequence[Proposal], count: int) -> list[Proposal]
 def propose_replacements(
     fitter: Fitter, fit: Fit, effects: Sequence[Effect], count: int, threads: Threads
 ) -> list[tuple[tuple[Effect, ...], Values]]:
-    """Replace each effect of a fit in turn by those whose response is most like its own: what was
-    found first may only resemble what is there.
+    """Propose replacements of each effect of a fit by those with the most similar response.
+
+    An effect that was fitted early may only resemble the effect that is present.
 
     Parameters
     ----------
     fitter
         Fitter of the evidence.
     fit
-        The fit.
+        Fit whose effects are replaced in turn.
     effects
-        Candidates, all screened before.
+        Candidate effects, all of them screened.
     count
-        Effects that are tried in the place of each.
+        Number of candidates tried in the place of each effect.
     threads
-        Threads that work side by side.
+        Threads that simulate in parallel.
 
     Returns
     -------
     list of pairs
-        Effects, and values to start from.
+        Effects, and the values from which they are fitted.
     """
-    found = []
-    here = fitter.residual_at(fit)
-    for number, effect in enumerate(fit.effects):
-        kept = (*fit.effects[:number], *fit.effects[number + 1 :])
-        values = (*fit.values[:number], *fit.values[number + 1 :])
-        without = fitter.evidence.residual(with_values(fitter.plant, kept, values))
-        response = without - here
+    starts = []
+    residual = fitter.residual_at(fit)
+    for number, (effect, remaining, values) in enumerate(leave_one_out(fit)):
+        without = fitter.evidence.residual(with_values(fitter.plant, remaining, values))
+        response = without - residual
 
-        def resemble(other: Effect, response: Array = response) -> tuple[float, Effect, Values]:
-            starts, responses = zip(*fitter.responses_beside(other, fit), strict=True)
-            # An effect that takes a tolerance's place is not what that tolerance may take up.
-            space = fitter.space.beside((other,))
-            both = np.column_stack([np.stack(responses, axis=1).astype(np.float64), response])
-            shapes = space.project_out(both)
-            shapes, own = shapes[:, :-1], shapes[:, -1]
-            along, power = shapes.T @ own, np.maximum(np.sum(shapes**2, axis=0), 1e-100)
-            alike = np.maximum(along, 0.0) ** 2 / (power * float(own @ own) + 1e-300)
-            best = int(np.argmax(alike))
-            share = min(float(along[best] / power[best]), 3.0)
-            return float(alike[best]), other, fitter.scale_start(other, starts[best], share)
+        def resemble(
+            candidate: Effect, response: Array = response
+        ) -> tuple[float, Effect, tuple[float, ...]]:
+            return _resemble(fitter, fit, candidate, response)
 
-        others = [
-            other
-            for other in effects
-            if other not in fit.effects
-            and not clashes(other, fit.effects)
-            and is_possible((*kept, other), fitter.plant)
+        possible = [
+            candidate
+            for candidate in effects
+            if candidate not in fit.effects and is_possible((*remaining, candidate), fitter.plant)
         ]
-        rivals = [
-            other
-            for other in effects
-            if other not in fit.effects
-            and clashes(other, (effect,))
-            and not clashes(other, kept)
-            and is_possible((*kept, other), fitter.plant)
+        compatible = [item for item in possible if not clashes(item, fit.effects)]
+        # `sorted` is stable, so that candidates that resemble alike keep their order.
+        scored = sorted(threads.spread(resemble, compatible), key=lambda item: -item[0])
+        starts += _choose_replacements(fit, number, scored, count)
+        # A candidate that sets a parameter of the replaced effect has no response beside it, so
+        # that it is tried unseen.
+        exclusive = [
+            candidate
+            for candidate in possible
+            if clashes(candidate, (effect,)) and not clashes(candidate, remaining)
         ]
-        scored = sorted(threads.spread(resemble, others), key=lambda item: -item[0])
-        for rank, (gain, other, start) in enumerate(scored):
-            resembles = rank < count and gain > RESEMBLES
-            # The same at another component is the first thing to be asked about, and what else
-            # may make this one late.
-            elsewhere = rank < MOVED and other.kind.name == effect.kind.name
-            late = other.group == effect.group and {other.kind.name, effect.kind.name} <= {*LATE}
-            if resembles or elsewhere or late:
-                found.append(_put(fit, number, other, start[0]))
-            if {other.kind.name, effect.kind.name} <= {*LATE_BY_TIME} and (late or elsewhere):
-                # To first order a lag does the same as a delay of equal size.
-                found.append(_put(fit, number, other, fit.values[number]))
-        # An effect that sets a parameter of the one that it replaces has no response beside it.
-        found += [
-            _put(fit, number, other, fitter.starts(other).values[0]) for other in rivals[:count]
+        starts += [
+            _replace_effect(fit, number, candidate, fitter.starts(candidate).values[0])
+            for candidate in exclusive[:count]
         ]
-    return found
+    return starts
 
 
-def _put(
-    fit: Fit, number: int, other: Effect, start: tuple[float, ...]
+def _resemble(
+    fitter: Fitter, fit: Fit, candidate: Effect, response: Array
+) -> tuple[float, Effect, tuple[float, ...]]:
+    """Return how well a candidate's response explains another response, and a start for it.
+
+    The measure is the squared cosine of the angle between both, 0 where they oppose each other.
+    """
+    starts, responses = zip(*fitter.responses_beside(candidate, fit), strict=True)
+    # An effect that replaces a tolerance must not be judged beside that tolerance.
+    space = fitter.space.without_replaced((candidate,))
+    both = np.column_stack([np.stack(responses, axis=1).astype(np.float64), response])
+    projected = space.project_out(both)
+    shapes, target = projected[:, :-1], projected[:, -1]
+    along, power = shapes.T @ target, np.maximum(np.sum(shapes**2, axis=0), 1e-100)
+    cosines = np.maximum(along, 0.0) ** 2 / (power * float(target @ target) + 1e-300)
+    best = int(np.argmax(cosines))
+    share = min(float(along[best] / power[best]), LARGEST_SHARE)
+    (start,) = fitter.scale_start(candidate, starts[best], share)
+    return float(cosines[best]), candidate, start
+
+
+def _choose_replacements(
+    fit: Fit,
+    number: int,
+    scored: Sequence[tuple[float, Effect, tuple[float, ...]]],
+    count: int,
+) -> list[tuple[tuple[Effect, ...], Values]]:
+    """Choose among candidates, the most similar first, those tried in the place of one effect.
+
+    Beside the most similar ones, these are the same kind at other components, and kinds that delay
+    the same signal: the questions that an engineer would ask first.
+    """
+    effect = fit.effects[number]
+    starts = []
+    for rank, (cosine, candidate, start) in enumerate(scored):
+        kinds = {candidate.kind.name, effect.kind.name}
+        resembles = rank < count and cosine > RESEMBLES
+        elsewhere = rank < ELSEWHERE and candidate.kind.name == effect.kind.name
+        late = candidate.group == effect.group and kinds <= {*LATE}
+        if resembles or elsewhere or late:
+            starts.append(_replace_effect(fit, number, candidate, start))
+        if kinds <= {*LATE_BY_TIME} and (late or elsewhere):
+            # To first order a lag equals a delay of the same time: 1 / (1 + T s) = exp(-T s) + ...
+            starts.append(_replace_effect(fit, number, candidate, fit.values[number]))
+    return starts
+
+
+def _replace_effect(
+    fit: Fit, number: int, candidate: Effect, start: tuple[float, ...]
 ) -> tuple[tuple[Effect, ...], Values]:
-    """The effects of a fit with one of them replaced, and values to start from."""
+    """Return the effects of a fit with one replaced, and the values from which they are fitted."""
     effects, values = list(fit.effects), list(fit.values)
-    effects[number], values[number] = other, start
+    effects[number], values[number] = candidate, start
     return tuple(effects), tuple(values)

@@ -1,7 +1,7 @@
-"""Sets of effects that nearly every machine has: friction, mass, stiffness, offsets.
+"""Regular effects, which nearly every machine has: friction, mass, stiffness, offsets.
 
-They are fitted together, and then one after another is left out, because an effect that is found
-alone may stand for several of them at once.
+They are fitted together, and then left out one after another. A stepwise search alone may stop at a
+single effect that resembles several regular effects at once.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from rigtwin.diagnosis.starts import GATEWAY, REGULAR, Start
 from rigtwin.diagnosis.threads import Threads
 
 GATEWAY_STARTS = 3
-"""Sizes of the gateway from which regular effects are fitted together."""
+"""Number of sizes of dry friction from which regular effects are fitted together."""
 FEW_REGULAR = 6
-"""Regular effects up to which all of these sizes are tried."""
+"""Largest number of regular effects for which all of these sizes are tried."""
 ELIMINATED = 4
-"""Sets that are fitted of those from which one regular effect after another was left out."""
+"""Number of reduced sets of regular effects that are fitted."""
 
 
 def start_balanced(fitter: Fitter, effects: Sequence[Effect]) -> list[Start]:
@@ -32,73 +32,75 @@ def start_balanced(fitter: Fitter, effects: Sequence[Effect]) -> list[Start]:
     fitter
         Fitter of the evidence.
     effects
-        Effects of one parameter each.
+        Effects with a single parameter.
 
     Returns
     -------
     list of Start
-        One start; none where no joint goes by itself.
+        A single start. Empty where no joint moves freely.
     """
     balanced = balance_forces(fitter, effects)
     return [] if balanced is None else [(tuple(effects), balanced)]
 
 
 def choose_regulars(
-    effects: Sequence[Effect], screened: Sequence[Screened], worth: float
+    effects: Sequence[Effect], screened: Sequence[Screened], least: float
 ) -> tuple[Effect, ...]:
-    """Choose the regular effects that promise anything, at every component that can have them.
+    """Choose the regular effects that promise to explain something.
 
     Parameters
     ----------
     effects
-        Candidates.
+        Candidate effects.
     screened
-        What each of them promises.
-    worth
+        Screened candidates with their promises.
+    least
         Chi-square that an effect other than dry friction must promise.
 
     Returns
     -------
     tuple of Effect
-        One of each kind, or one of each kind at each guide where joints are coupled.
+        One effect of each kind. Where joints are coupled, one of each kind at each guide.
     """
-    promise = {each.effect: each.promise for each in screened}
+    promise = {entry.effect: entry.promise for entry in screened}
     coupled = len({effect.group for effect in effects if effect.of is Guide}) > 1
     chosen: dict[tuple[str, str], Effect] = {}
     for effect in effects:
         name = effect.kind.name
         if measures(effect.of()):
             continue
-        if name in REGULAR and (promise[effect] > worth or name == GATEWAY):
-            at = effect.group if coupled and effect.of is Guide else ""
-            chosen.setdefault((name, at), effect)
+        # Dry friction is always chosen: springs and plays in series with it need it.
+        if name in REGULAR and (promise[effect] > least or name == GATEWAY):
+            place = effect.group if coupled and effect.of is Guide else ""
+            chosen.setdefault((name, place), effect)
     return tuple(chosen.values())
 
 
 def fit_together(
     fitter: Fitter, chosen: tuple[Effect, ...], price: float, threads: Threads
 ) -> tuple[Fit, list[Start]]:
-    """Fit all chosen effects together, and start sets of fewer of them.
+    """Fit all chosen effects together, and start subsets of them.
 
     Parameters
     ----------
     fitter
         Fitter of the evidence.
     chosen
-        Effects that are fitted together.
+        Effects fitted jointly.
     price
-        Chi-square that each effect should gain.
+        Chi-square that an effect should gain.
     threads
-        Threads that fit side by side.
+        Threads that fit in parallel.
 
     Returns
     -------
     tuple
-        The fit of all, and starts of the sets that remain when the effect that is missed least is
-        left out again and again.
+        Joint fit, and starts of the subsets that remain when the effect of least gain is left out
+        repeatedly.
     """
 
-    def start_of(effect: Effect, number: int) -> tuple[float, ...]:
+    def choose_start(effect: Effect, number: int) -> tuple[float, ...]:
+        # Only the size of dry friction is varied: its response is the least linear one.
         if effect.kind.name != GATEWAY:
             return tuple(effect.nominal(fitter.plant).values())
         values = [value for value in fitter.starts(effect).values if value[0] > 0.0]
@@ -106,14 +108,16 @@ def fit_together(
 
     count = GATEWAY_STARTS if len(chosen) <= FEW_REGULAR else 1
     starts: list[Values] = [
-        tuple(start_of(effect, number) for effect in chosen) for number in range(count)
+        tuple(choose_start(effect, number) for effect in chosen) for number in range(count)
     ]
     starts += [values for _, values in start_balanced(fitter, chosen)]
     tries = threads.map(lambda values: fitter.refine(chosen, values), starts)
     whole = min(tries, key=lambda fit: fit.misfit)
-    path = sorted(
-        Linearised(fitter, whole).eliminate(), key=lambda each: each[0] + price * len(each[1])
+    # The linearised fit is precise enough to rank the subsets: misfit plus price per effect.
+    subsets = sorted(
+        Linearised(fitter, whole).eliminate(),
+        key=lambda subset: subset[0] + price * len(subset[1]),
     )
-    reduced = [(effects, values) for _, effects, values in path[:ELIMINATED]]
+    reduced = [(effects, values) for _, effects, values in subsets[:ELIMINATED]]
     balanced = [start for effects, _ in reduced for start in start_balanced(fitter, effects)]
     return whole, [*balanced, *reduced]

@@ -1,4 +1,4 @@
-"""What is left of a comparison, beside what noise alone would leave."""
+"""Residual of a comparison, beside the residual that noise alone would leave."""
 
 from __future__ import annotations
 
@@ -11,15 +11,29 @@ from rigtwin.numerics.arrays import Array
 from rigtwin.signals.noise import band, rms
 
 SIGNIFICANT_DIGITS = 8
-"""Digits to which recordings in text keep a command; a controller that agrees to them is exact."""
+"""Significant digits of a command in a recording stored as text. A replayed controller that agrees
+to them counts as exact."""
 
 
 @dataclass(frozen=True)
 class Residual:
-    """What is left of one comparison. residual: rms, its mean in, the mains line out; noise_floor:
-    what the sensors' white noise alone would leave; ratio: of the two; band_hz: where the middle 80
-    % of the residual's power lies. unit "1": several outputs together, each in units of its own
-    noise floor, and `outputs` has them apart."""
+    """Residual of one comparison.
+
+    Attributes
+    ----------
+    residual
+        rms of the difference with its mean and without the mains line, in `unit`.
+    noise_floor
+        rms that the sensors' white noise alone would leave, in `unit`.
+    ratio
+        Ratio of residual to noise floor.
+    unit
+        Unit of the signal; "1" for several outputs combined, each in units of its noise floor.
+    band_hz
+        Band with the middle 80 % of the residual's power, Hz.
+    outputs
+        Residual of each output, by name, where several are combined.
+    """
 
     residual: float
     noise_floor: float
@@ -30,11 +44,27 @@ class Residual:
 
 
 def compute_residual(difference: Array, floor: float, unit: str, period: float) -> Residual:
-    """The residual of one output."""
-    left = rms(difference)
-    return Residual(
-        left, floor, left / floor if floor > 0 else math.inf, unit, band(difference, period)
-    )
+    """Return the residual of one output.
+
+    Parameters
+    ----------
+    difference
+        Measured less predicted signal, in `unit`, shape (ticks,).
+    floor
+        Noise floor, in `unit`.
+    unit
+        Unit of the signal.
+    period
+        Time from tick to tick, s.
+
+    Returns
+    -------
+    Residual
+        rms of the difference; the ratio is infinite if the floor is 0.
+    """
+    residual = rms(difference)
+    ratio = residual / floor if floor > 0 else math.inf
+    return Residual(residual, floor, ratio, unit, band(difference, period))
 
 
 def combine_residuals(
@@ -47,8 +77,19 @@ def combine_residuals(
 
 
 def rounding(recorded: Array) -> float:
-    """rms error of a column kept to eight significant digits of its largest value; 1e-12 of a unit
-    for a column of zeros."""
+    """Return the rms rounding error of a column stored with eight significant digits.
+
+    Parameters
+    ----------
+    recorded
+        Values of the column, shape (ticks,).
+
+    Returns
+    -------
+    float
+        q / sqrt(12), where q is the last stored digit of the largest value; 1e-12 for a column of
+        zeros.
+    """
     largest = float(np.max(np.abs(recorded)))
     # Eight digits below that the smallest numbers of a computer begin.
     if largest < 1e-290:

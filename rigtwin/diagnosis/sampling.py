@@ -1,4 +1,8 @@
-"""What the signals themselves say of their sensors: white noise, mains line, size of one bit."""
+"""Properties of sensors estimated from their signals alone: white noise, hum and bit.
+
+A sensor of the resolution q rounds with the variance q^2 / 12. It is subtracted from the measured
+noise, so that a coarse bit is not counted as noise as well.
+"""
 
 from __future__ import annotations
 
@@ -16,15 +20,26 @@ from rigtwin.recording import Recording
 from rigtwin.signals.noise import remove_mains, rms, smallest_step, white_noise
 
 OUTSTANDING = 1.6
-"""Times its nominal value, and times what the other sensors have more than nominal, from which a
-sensor's noise, hum or bit is a finding. What all sensors have more is the laboratory's noise, which
-nobody declares exactly."""
+"""Ratio of a sensor's noise, hum or bit to its nominal value from which it is a finding. The ratio
+must also exceed the median ratio of the other sensors by this factor: an excess that all sensors
+share is noise of the laboratory, which is never declared exactly."""
 
 
 @dataclass(frozen=True)
 class SensorProperty:
-    """One property of one sensor. kind: noise, hum or quantisation; parameter: its name; value,
-    nominal: in the sensor's unit."""
+    """Property of one sensor that differs from its nominal value.
+
+    Attributes
+    ----------
+    component
+        Name of the sensor.
+    kind
+        Kind of effect: noise, hum or quantisation.
+    parameter
+        Parameter of the sensor that has this property.
+    value, nominal
+        Estimated and nominal value, in the sensor's unit.
+    """
 
     component: str
     kind: str
@@ -34,33 +49,35 @@ class SensorProperty:
 
 
 PROPERTIES = {"white": "noise", "hum": "hum", "resolution": "quantisation"}
-"""Parameter of a sensor → the kind of effect that it is the magnitude of."""
+"""Parameter of a sensor → kind of effect whose magnitude it is."""
 
 
 def properties(signal: Array, predicted: Array, period: float, mains: float) -> dict[str, float]:
-    """What a sensor shows by itself.
+    """Estimate the properties of one sensor.
 
     Parameters
     ----------
     signal, predicted
-        What it read, and what a twin says that it should
-    read, shape (ticks,), in its unit.
+        Measured and predicted signal, in the sensor's unit, shape (ticks,).
     period
-        s, of a tick.
+        Time from tick to tick, s.
     mains
-        Hz.
+        Frequency of the mains, Hz.
 
     Returns
     -------
-    White noise rms, amplitude of the mains line and size of a bit, in its unit.
+    dict
+        White noise rms, amplitude of the mains line and size of a bit, in the sensor's unit.
     """
     difference = signal - predicted
     line = difference - remove_mains(difference, period, mains)
     bit = smallest_step(signal)
-    # What a controller makes of its sensors' noise shakes the machine, and is no noise of theirs.
+    # A controller feeds the sensors' noise back to the machine. The prediction contains the motion
+    # that follows, so that the residual may have less noise than the signal: the smaller counts.
     noise = min(white_noise(signal), white_noise(difference))
-    # White noise as the bits leave it: a coarse bit adds a variance of its own.
+    # Rounding to a bit adds a variance of bit^2 / 12.
     white = math.sqrt(max(noise**2 - bit**2 / 12.0, 0.0))
+    # The amplitude of a sine is sqrt(2) times its rms.
     return {"white": white, "hum": math.sqrt(2.0) * rms(line - np.mean(line)), "resolution": bit}
 
 
@@ -70,35 +87,43 @@ def find_outstanding(
     predicted: Sequence[Array],
     plant: Plant,
 ) -> tuple[SensorProperty, ...]:
-    """What stands out of nominal, and of what the other sensors have, where noise is
-    declared.
+    """Find sensor properties that exceed both their nominal values and those of other sensors.
+
+    Sensors without declared noise are not judged.
 
     Parameters
     ----------
     machine
-        Whose sensors they are; what its description says a sensor cannot have is left out.
+        Machine with the sensors. Effects that its description excludes are not reported.
     recordings
-        Of it.
+        Recordings of the machine.
     predicted
-        What a twin says that its rows should be, shape (rows, ticks) for each recording.
+        Predicted signals, shape (rows, ticks) for each recording.
     plant
-        With the sensors' nominal properties.
+        Plant with the sensors' nominal properties.
+
+    Returns
+    -------
+    tuple of SensorProperty
+        Outstanding properties.
     """
     table: dict[str, dict[str, float]] = {}
     for number, row in enumerate(machine.rows):
         sensor = getattr(plant, row.name, None)
         if sensor is None or not measures(sensor) or sensor.white == 0.0:
             continue
-        each = [
+        by_recording = [
             properties(r.column(*row.channel), rows[number], r.period, plant.mains.frequency)
             for r, rows in zip(recordings, predicted, strict=True)
         ]
-        table[row.name] = {key: float(np.median([one[key] for one in each])) for key in PROPERTIES}
+        table[row.name] = {
+            key: float(np.median([part[key] for part in by_recording])) for key in PROPERTIES
+        }
     possible = {effect.name for effect in machine.effects()}
-    found: list[SensorProperty] = []
+    outstanding: list[SensorProperty] = []
     for parameter, kind in PROPERTIES.items():
         nominal = {name: float(getattr(getattr(plant, name), parameter)) for name in table}
-        # Hum is seen above what white noise alone would show of a line.
+        # A sensor whose nominal value is 0 cannot have this property.
         ratios = {
             name: values[parameter] / nominal[name] if nominal[name] > 0.0 else 0.0
             for name, values in table.items()
@@ -106,16 +131,18 @@ def find_outstanding(
         for name, ratio in ratios.items():
             if f"{kind}@{name}" not in possible:
                 continue
+            # Only the larger of noise and bit is observable: noise hides a smaller bit, and a bit
+            # hides smaller noise.
             if kind == "quantisation" and table[name]["resolution"] < table[name]["white"]:
                 continue
             if kind == "noise" and table[name]["resolution"] > table[name]["white"]:
                 continue
-            # A line within one bit reads as anything up to the bit, by where the signal stands.
+            # A hum smaller than the bit may appear as anything from 0 to one bit.
             if kind == "hum" and table[name]["resolution"] > table[name]["hum"]:
                 continue
-            # Without another sensor there is nothing that says what the laboratory has more.
-            others = [other for key, other in ratios.items() if key != name] or [1.0]
-            if ratio > OUTSTANDING * max(1.0, float(np.median(others))):
+            # A single sensor is compared with its nominal value alone.
+            references = [value for key, value in ratios.items() if key != name] or [1.0]
+            if ratio > OUTSTANDING * max(1.0, float(np.median(references))):
                 value = table[name][parameter]
-                found.append(SensorProperty(name, kind, parameter, value, nominal[name]))
-    return tuple(found)
+                outstanding.append(SensorProperty(name, kind, parameter, value, nominal[name]))
+    return tuple(outstanding)

@@ -1,14 +1,17 @@
-"""How well a hypothesis predicts data that are held out of its fit.
+"""Cross-validation of hypotheses: how well a fit predicts data that are held out of it.
 
 The whitened residual of each signal is cut into bands of frequency, and each band into blocks of
 time. Where the model is known, every band has a discrepancy of its own scale (a Whittle
-likelihood), so that what is left at low frequencies does not hide what happens at high ones.
-Blocks, or whole recordings where there are several, are left out in turn; the values are moved to
-those of the remaining data by one Gauss-Newton step, and the residual of the blocks left out is
-what counts. All of it follows from the normal equations of every block, so that judging a fit costs
-one Jacobian.
+likelihood), so that a large residual at low frequencies does not mask one at high frequencies.
 
-Nuisance parameters (tolerances) are free beside the effects within their Gaussian priors.
+Blocks, or whole recordings where there are several, are held out in turn. Let r_b be the residual
+of block b, J_b its jacobian in the fitted parameters and the free tolerances, and P their prior
+precision. Without the held-out blocks H, one Gauss-Newton step moves the parameters by
+
+    m_H = -(sum(J_b'J_b) + P)^-1 (sum(J_b'r_b) + p),        sums over b not in H,
+
+with p the gradient of the prior. The held-out power of a block in H is |r_b + J_b m_H|^2. All of it
+follows from the products J'J, J'r and r'r of every block, so that judging a fit costs one jacobian.
 """
 
 from __future__ import annotations
@@ -30,54 +33,54 @@ from rigtwin.diagnosis.blocks import (
 from rigtwin.diagnosis.fit import Fit, Values, with_values
 from rigtwin.diagnosis.fitter import Fitter
 from rigtwin.diagnosis.gauss_newton import shorten, take_derivatives
-from rigtwin.diagnosis.space import BEYOND, PRIOR
+from rigtwin.diagnosis.space import BOUND, PRIOR
 from rigtwin.numerics.arrays import Array
 
 FOLDS = 5
-"""Sets of blocks that are left out in turn where there is one recording; they interleave, so that
-each has all directions and speeds."""
+"""Number of sets of blocks that are held out in turn where there is one recording. The sets
+interleave, so that each contains all directions and speeds of the motion."""
 RIDGE = 1e-9
 """Share of the normal matrix' diagonal that is added to it."""
-SMALLEST = 1e-12
-"""Share of the largest response below which another is none."""
+SMALLEST_RESPONSE = 1e-12
+"""Share of the largest response below which an effect has no response."""
 
 
 @dataclass(frozen=True)
 class Scored:
     """A fit and its cross-validation.
 
-    Parameters
+    Attributes
     ----------
     fit
-        Effects and values.
+        Fitted effects and values.
     levels
         Power of the held-out residual in units of noise and declared error, shape (recordings,
         signals, bands). 1 is no gap; 0 where a recording has no such band.
     inside
-        The same of the data of the fit.
+        Power of the residual on the data of the fit, in the same units and shape.
     pieces
-        Number of independent samples that the residual consists of, of the same shape.
+        Number of independent samples of the residual, of the same shape.
     samples
         Number of all samples, of the same shape.
     excess
         Noise of the motions that drive the model beyond that at the nominal plant, as a share of
         noise and declared error, of the same shape.
     widths
-        Standard error of each value. It is the larger of the formal one and the sandwich estimate
-        over blocks, which holds for coloured residuals too.
+        Standard error of each value: the larger of the formal one and the sandwich estimate over
+        blocks. The latter is valid for coloured residuals.
     reach
         Share of each signal in an effect's response, shape (effects, signals).
     together
         For each pair of effects whose responses oppose each other, the size of their joint response
         relative to the smaller of the two; 1 for other pairs; shape (effects, effects).
     accounts
-        Amplitude that each effect alone accounts for, the others taken anew, as a share of the
-        signals', to first order; shape (effects,).
+        Amplitude that each effect accounts for when all others are refitted, as a share of the
+        signals' amplitude, to first order; shape (effects,).
     rest
-        Amplitude of each signal's residual beyond noise and declared error, in the same unit, shape
-        (signals,).
+        Amplitude of each signal's residual beyond noise and declared error, as a share of the
+        signals' amplitude, shape (signals,).
     bounded
-        Whether a value lies at the end of the range that is searched.
+        Whether a value is held by a bound of its range.
     """
 
     fit: Fit
@@ -95,11 +98,17 @@ class Scored:
 
 
 class Scorer:
-    """Scores fits to one body of evidence."""
+    """Scores fits to one body of evidence.
+
+    Parameters
+    ----------
+    fitter
+        Fitter of the evidence.
+    """
 
     def __init__(self, fitter: Fitter) -> None:
         self._fitter, self._evidence = fitter, fitter.evidence
-        self._known: dict[tuple[object, ...], Scored] = {}
+        self._cache: dict[tuple[object, ...], Scored] = {}
         self._samples = count_samples(self._evidence)
         swings = [
             lines.measured - lines.measured.mean(axis=1, keepdims=True)
@@ -118,12 +127,12 @@ class Scorer:
         Returns
         -------
         Scored
-            What it predicts of the data that are left out in turn.
+            The fit with the power of its residual on held-out data.
         """
         key = (fit.effects, fit.values, fit.used)
-        if key not in self._known:
-            self._known[key] = self._score(fit)
-        return self._known[key]
+        if key not in self._cache:
+            self._cache[key] = self._score(fit)
+        return self._cache[key]
 
     def _score(self, fit: Fit) -> Scored:
         evidence, fitter = self._evidence, self._fitter
@@ -131,46 +140,49 @@ class Scorer:
         sizes = [len(effect.kind.parameters) for effect in fit.effects]
         count = sum(sizes)
 
-        def residual(vector: Array) -> Array:
+        def residual_at(vector: Array) -> Array:
             return evidence.residual(with_values(base, fit.effects, _split(vector, sizes)))
 
-        space = fitter.space.beside(fit.effects)
-        here = np.concatenate([np.asarray(v, float) for v in fit.values]) if count else np.zeros(0)
-        left = residual(here)
+        space = fitter.space.without_replaced(fit.effects)
+        values = (
+            np.concatenate([np.asarray(v, float) for v in fit.values]) if count else np.zeros(0)
+        )
+        residual = residual_at(values)
         used = np.array(fit.used) if fit.used else np.zeros(space.columns.shape[1])
-        columns = np.zeros((len(left), 0))
+        columns = np.zeros((len(residual), 0))
         steps = np.zeros(0)
         if count:
             steps = np.concatenate([fitter.starts(effect).steps for effect in fit.effects])
             _, high = fitter.bounds(fit.effects)
-            columns = take_derivatives(residual, here, left, steps, high)
-            # Steps that change more than is left are secants far from the tangent.
-            steps = steps * shorten(columns, float(left @ left))
-            columns = take_derivatives(residual, here, left, steps, high)
-        # Tolerances that stand at their bound stay there; the others are free about their estimate.
-        found = space.estimate_tolerances(left + space.columns @ used)
-        free = np.abs(found) < BEYOND
-        left = left + space.columns @ (used - found)
+            columns = take_derivatives(residual_at, values, residual, steps, high)
+            # A step that changes more than the residual itself gives a secant far from the tangent.
+            steps = steps * shorten(columns, float(residual @ residual))
+            columns = take_derivatives(residual_at, values, residual, steps, high)
+        # Tolerances at their bound are fixed there; the others are free about their estimate.
+        estimate = space.estimate_tolerances(residual + space.columns @ used)
+        free = np.abs(estimate) < BOUND
+        residual = residual + space.columns @ (used - estimate)
         free &= np.any(space.columns != 0.0, axis=0)
-        stack = np.column_stack([columns, -space.columns[:, free], left])
+        # One stack of J (effects, then tolerances) and r gives all products at once.
+        stack = np.column_stack([columns, -space.columns[:, free], residual])
         products, expected = block_products(evidence, stack)
         prior = np.concatenate([np.zeros(count), np.full(int(free.sum()), PRIOR)])
         samples = self._samples
         levels, inside = _cross_validate(
-            products, expected, prior, prior * _pad(found[free], count)
+            products, expected, prior, prior * _pad(estimate[free], count)
         )
         scored = Scored(
             fit=fit,
             levels=levels,
             inside=inside,
-            pieces=np.minimum(count_independent(evidence, left), samples),
+            pieces=np.minimum(count_independent(evidence, residual), samples),
             samples=samples,
             excess=excess_by_band(evidence, fit),
         )
         if not count:
             return scored
         places = [sum(sizes[:number]) for number in range(len(sizes))]
-        moves = self._moves(fit, here, steps, places)
+        moves = self._moves(fit, values, steps, places)
         return replace(
             scored,
             widths=_split(_standard_errors(products, expected, prior, count) * steps, sizes),
@@ -181,55 +193,70 @@ class Scorer:
             bounded=fitter.is_bounded(fit),
         )
 
-    def _moves(self, fit: Fit, here: Array, steps: Array, places: Sequence[int]) -> Array:
-        """How many steps each magnitude is off nominal, shape (effects,)."""
+    def _moves(self, fit: Fit, values: Array, steps: Array, places: Sequence[int]) -> Array:
+        """Return the difference of each magnitude from nominal, in steps, shape (effects,).
+
+        `places` has the position of each effect's magnitude among all parameters.
+        """
         nominal = [
             effect.nominal(self._fitter.plant)[effect.kind.parameters[0]] for effect in fit.effects
         ]
-        return (here[places] - np.array(nominal)) / steps[places]
+        return (values[places] - np.array(nominal)) / steps[places]
 
     def _accounts(
         self, moves: Array, places: Sequence[int], products: Array, prior: Array
     ) -> Array:
-        """Share of the signals' amplitude that would be left without each effect."""
+        """Return the share of the signals' amplitude that each effect accounts for.
+
+        To first order, moving a parameter back by m while all others are refitted raises the
+        chi-square by m^2 / (N^-1)_ii, with N the normal matrix.
+        """
         inverse = np.linalg.inv(_normal_matrix(products, prior))
         power = moves**2 / np.maximum(np.diag(inverse)[places], TINY)
         return np.asarray(np.sqrt(power / self._signal_power))
 
     def _rest(self, products: Array, expected: Array) -> Array:
-        """Amplitude of each signal beyond noise and declared error, as a share of all signals'."""
+        """Return each signal's residual beyond noise and declared error, as a share of all
+        signals' amplitude."""
         beyond = products[..., -1, -1].sum(axis=(0, 2, 3)) - expected.sum(axis=(0, 2, 3))
         return np.asarray(np.sqrt(np.maximum(beyond, 0.0) / self._signal_power))
 
 
 def _together(moves: Array, places: Sequence[int], products: Array) -> Array:
-    """How far pairs of effects undo each other, to first order."""
+    """Return the joint response of each pair of effects relative to the smaller single response.
+
+    With responses a and b, |a + b| / min(|a|, |b|). Pairs that do not oppose each other have 1.
+    """
     gram = products.sum(axis=(0, 1, 2, 3))[np.ix_(places, places)] * np.outer(moves, moves)
     size = np.diag(gram)
     both = np.maximum(size[:, None] + size[None, :] + 2.0 * gram, 0.0)
     least = np.minimum(size[:, None], size[None, :])
-    relative = np.sqrt(both / np.maximum(least, SMALLEST * float(np.max(size, initial=TINY))))
+    # A pair in which one effect has no response must not appear to cancel.
+    negligible = SMALLEST_RESPONSE * float(np.max(size, initial=TINY))
+    relative = np.sqrt(both / np.maximum(least, negligible))
     relative[gram >= 0.0] = 1.0
     return np.minimum(relative, 1.0)
 
 
 def _reach(places: Sequence[int], products: Array) -> Array:
-    """Share of each signal in the response to each effect's magnitude, to first order."""
+    """Return the share of each signal in the response to each effect's magnitude."""
     power = np.stack([products[..., place, place].sum(axis=(0, 2, 3)) for place in places])
     return np.asarray(power / np.maximum(power.sum(axis=1, keepdims=True), TINY))
 
 
 def _pad(values: Array, count: int) -> Array:
+    """Put zeros before values: the effects' parameters have no prior."""
     return np.concatenate([np.zeros(count), values])
 
 
 def _split(vector: Array, sizes: Sequence[int]) -> Values:
+    """Cut a vector of all parameters into the values of each effect."""
     cuts = np.cumsum(sizes)[:-1]
     return tuple(tuple(part.tolist()) for part in np.split(vector, cuts)) if len(sizes) else ()
 
 
 def _folds(recordings: int) -> list[NDArray[np.bool_]]:
-    """Which blocks are left out in turn, shape (recordings, blocks) each."""
+    """Return the blocks that are held out in turn, shape (recordings, blocks) for each fold."""
     if recordings > 1:
         return [
             np.repeat(np.arange(recordings)[:, None] == number, BLOCKS, axis=1)
@@ -241,49 +268,69 @@ def _folds(recordings: int) -> list[NDArray[np.bool_]]:
 def _cross_validate(
     products: Array, expected: Array, prior: Array, pull: Array
 ) -> tuple[Array, Array]:
-    """Power of the residual left out and of the whole fit, in units of what is expected.
+    """Return the power of the held-out residual and of the whole fit, relative to the expected one.
 
-    pull: gradient of the prior at the values of the fit.
+    Parameters
+    ----------
+    products
+        Products of all columns in every block, see `block_products`. The residual is the last
+        column.
+    expected
+        Power of noise and declared error, shape (recordings, signals, bands, blocks).
+    prior
+        Prior precision of each parameter, shape (columns - 1,).
+    pull
+        Gradient of the prior at the values of the fit, shape (columns - 1,).
+
+    Returns
+    -------
+    tuple of arrays
+        Held-out and fitted power, shape (recordings, signals, bands) each.
     """
     count = products.shape[-1] - 1
     normal, gradient = products[..., :count, :count], products[..., :count, count]
     power = products[..., count, count]
-    out = power.copy()
+    held_out = power.copy()
     if count:
         blocks, slopes = normal.sum(axis=(1, 2)), gradient.sum(axis=(1, 2))
         whole, right = blocks.sum(axis=(0, 1)), slopes.sum(axis=(0, 1))
         ridge = np.diag(prior + RIDGE * np.diag(whole) + 1e-12)
-        # What all data still ask for is no matter of the fold: where the residual is not linear, as
-        # at a stick, a fit is no stationary point of its linearisation.
-        still = -np.linalg.solve(whole + ridge, right + pull)
-        for held in _folds(len(products)):
-            rest = whole - blocks[held].sum(axis=0) + ridge
-            move = -np.linalg.solve(rest, right - slopes[held].sum(axis=0) + pull) - still
+        # The move that all data ask for is subtracted from that of each fold. It is not 0 where the
+        # residual is discontinuous, as at a stick: such a fit is no stationary point of its
+        # linearisation.
+        common = -np.linalg.solve(whole + ridge, right + pull)
+        for fold in _folds(len(products)):
+            remaining = whole - blocks[fold].sum(axis=0) + ridge
+            slope = right - slopes[fold].sum(axis=0) + pull
+            move = -np.linalg.solve(remaining, slope) - common
+            # |r + J m|^2 = r'r + 2 (J'r)'m + m'J'J m, block by block.
             changed = power + 2.0 * gradient @ move + (normal @ move) @ move
-            places = np.broadcast_to(held[:, None, None, :], power.shape)
-            out[places] = changed[places]
+            places = np.broadcast_to(fold[:, None, None, :], power.shape)
+            held_out[places] = changed[places]
     total = expected.sum(axis=3)
     inverse = np.where(total > 0.0, 1.0 / np.maximum(total, TINY), 0.0)
-    return np.maximum(out.sum(axis=3), 0.0) * inverse, power.sum(axis=3) * inverse
+    return np.maximum(held_out.sum(axis=3), 0.0) * inverse, power.sum(axis=3) * inverse
 
 
 def _normal_matrix(products: Array, prior: Array) -> Array:
-    """Normal matrix of all data with the prior of the nuisances."""
+    """Return the normal matrix of all data with the prior of the nuisances."""
     columns = products.shape[-1] - 1
     normal = products[..., :columns, :columns].sum(axis=(0, 1, 2, 3))
     return np.asarray(normal + np.diag(prior + RIDGE * np.diag(normal) + 1e-12))
 
 
 def _standard_errors(products: Array, expected: Array, prior: Array, count: int) -> Array:
-    """Standard errors of the effects' parameters, in steps.
+    """Return the standard errors of the effects' parameters, in steps, shape (count,).
 
-    The formal ones are widened by what the residual exceeds noise and declared error; the sandwich
-    estimate takes the scatter of the gradient over blocks instead [White 1980].
+    The formal covariance is N^-1, scaled by the residual's excess over noise and declared error.
+    The sandwich estimate is N^-1 S N^-1, where S is the scatter of the gradient over blocks; it is
+    valid where neighbouring samples are correlated [White, Econometrica 48 (1980) 817].
     """
     columns = products.shape[-1] - 1
     inverse = np.linalg.inv(_normal_matrix(products, prior))
     scores = products[..., :columns, columns].sum(axis=(1, 2)).reshape(-1, columns)
     blocks = len(scores)
+    # The fitted columns use up degrees of freedom of the scatter.
     spread = scores.T @ scores * blocks / max(blocks - columns, 1)
     sandwich = inverse @ spread @ inverse
     excess = max(float(products[..., columns, columns].sum() / max(expected.sum(), TINY)), 1.0)

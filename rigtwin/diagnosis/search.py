@@ -1,13 +1,13 @@
-"""The search for hypotheses: every effect alone, then sets of effects, one step at a time.
+"""Search for hypotheses: single effects first, then sets of effects, one change at a time.
 
-1. Screen: each effect is tried at several values, and its linearised promise is noted.
+1. Screen: simulate each effect at several values, and note its promise to first order.
 2. Fit the promising effects alone, and the regular ones (friction, mass, stiffness) together.
-3. Extend the best hypotheses by one effect; replace each of their effects by those that resemble
-   it; leave each out. Repeat as long as a better hypothesis is found.
-4. Where much is left, try other values, and the same kinds at other components.
+3. Extend the best hypotheses by one effect. Replace each of their effects by those that resemble
+   it, and leave each out. Repeat as long as a better hypothesis is found.
+4. Where a large residual remains, restart from other values and at other components.
 
-A hypothesis is fitted on coarse evidence (half the integration steps, thinned where the model can
-do without), and scored on fine evidence.
+A hypothesis is fitted on coarse evidence: half the integration steps, thinned where the models
+allow it. It is scored on the same ticks with all integration steps.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from rigtwin.diagnosis.first_look import FirstLook, look_first
 from rigtwin.diagnosis.fit import Fit
 from rigtwin.diagnosis.fitter import Fitter, Screened
 from rigtwin.diagnosis.linearised import Linearised
-from rigtwin.diagnosis.posterior import Posterior
+from rigtwin.diagnosis.posterior import HypothesisPosterior
 from rigtwin.diagnosis.proposals import choose_distinct, propose_additions, propose_replacements
 from rigtwin.diagnosis.regulars import choose_regulars, fit_together, start_balanced
 from rigtwin.diagnosis.scoring import Scored, Scorer
@@ -41,39 +41,53 @@ from rigtwin.diagnosis.threads import Threads
 from rigtwin.diagnosis.thresholds import Thresholds
 
 SETTLED = 6
-"""Single effects that are fitted precisely."""
-PRECISE, SCORED = 2, 4
-"""Neighbours of a leader that are fitted precisely, and times as many that are scored."""
-AHEAD = 1
-"""Effects that a hypothesis may have more than the best one and still be extended."""
-BEHIND = 0.5
-"""Share of what the best hypothesis explains that another may lack and still be extended."""
+"""Number of single effects that are refitted precisely."""
+PRECISE = 2
+"""Number of hypotheses next to a leader that are refitted precisely."""
+SCORED = 4
+"""Ratio of the hypotheses next to a leader that are scored to those refitted precisely."""
+LONGER = 1
+"""Number of effects by which an extended hypothesis may exceed the best one."""
+LEADER_SHORTFALL = 0.5
+"""A hypothesis is extended if it explains at most this share less than the closest one."""
 MISSED = 10.0
-"""Prices of an effect whose loss is worth a fit without it."""
-VARIED, COMPARED = 2, 5
-"""Effects that are tried in the place of each while the search climbs, and of its result."""
+"""Prices by which a hypothesis may be worse without an effect, or than the best one, to be worth a
+fit."""
+VARIED = 2
+"""Number of effects tried in the place of each effect while the search climbs."""
+COMPARED = 5
+"""Number of effects tried in the place of each effect of the best hypothesis at the end."""
 BEGINNINGS = 4
-"""Single effects that are extended where the best hypothesis leaves much."""
+"""Number of single effects that are extended where the best hypothesis leaves a large residual."""
 STEADY_ROUNDS = 2
 """Rounds without a better hypothesis after which the search ends."""
 
 
 @dataclass
-class Search:
-    """A search on one body of evidence.
+class HypothesisSearch:
+    """Search for the hypotheses that explain one body of evidence.
 
     Parameters
     ----------
     evidence
-        The recordings about the nominal plant.
+        Recordings about their nominal plant.
     effects
-        Candidates.
+        Candidate effects.
     thresholds
-        Numbers that the search goes by.
+        Thresholds of search and score.
     threads
-        Threads that fit side by side.
+        Threads that fit in parallel.
     on_first_look
-        Called once all effects were tried, before any is fitted.
+        Called with the first look once all effects are screened, before any is fitted.
+
+    Attributes
+    ----------
+    pool
+        Best scored fit of each set of effects.
+    coarse, fine
+        Fitters on evidence with half and with all integration steps.
+    screened
+        Screened candidates.
     """
 
     evidence: Evidence
@@ -89,40 +103,43 @@ class Search:
         self.fine = Fitter(searched)
         self._scorer = Scorer(self.fine)
         self._extended: set[frozenset[Effect]] = set()
-        self._tried: set[Start] = set()
+        self._started: set[Start] = set()
         self.screened: list[Screened] = []
 
     @property
-    def posterior(self) -> Posterior:
-        """Weights of all that was tried so far."""
-        return Posterior(list(self.pool.values()), self.fine, len(self.effects), self.thresholds)
+    def posterior(self) -> HypothesisPosterior:
+        """Weights of all hypotheses scored so far."""
+        return HypothesisPosterior(
+            list(self.pool.values()), self.fine, len(self.effects), self.thresholds
+        )
 
-    def run(self) -> Posterior:
-        """Search.
+    def run(self) -> HypothesisPosterior:
+        """Search until no change of the best hypotheses improves on them.
 
         Returns
         -------
-        Posterior
-            All hypotheses that were tried, with their weights.
+        HypothesisPosterior
+            All scored hypotheses with their weights.
         """
         singles = self._fit_singles()
         if self._has_gap(singles):
-            # The cheapest single effect may explain one signal alone. The one that leaves least of
-            # all signals is extended too, and so is dry friction: where it acts through a spring or
-            # a play, it explains little by itself.
-            through = [fit for fit in singles if fit.effects[0].kind.name == GATEWAY]
-            for fit in (singles[0], *through[:1]):
-                if self.posterior.leaves_something and frozenset(fit.effects) not in self._extended:
+            # The cheapest single effect may explain one signal alone, so the single effect of least
+            # misfit over all signals is extended as well. So is dry friction: in series with a
+            # spring or a play it explains little by itself.
+            dry = [fit for fit in singles if fit.effects[0].kind.name == GATEWAY]
+            for fit in (singles[0], *dry[:1]):
+                fresh = frozenset(fit.effects) not in self._extended
+                if fresh and self.posterior.has_unexplained_residual:
                     self._extend(fit)
             self._climb()
             if (
-                self.posterior.leaves_something
+                self.posterior.has_unexplained_residual
                 or len(self.posterior.best.fit.effects) > 1
-                or self._swings_freely()
+                or self._has_free_joint()
             ):
                 self._fit_regulars()
                 self._climb()
-            if self.posterior.leaves_something:
+            if self.posterior.has_unexplained_residual:
                 self._restart()
                 self._climb()
             self._vary_best()
@@ -131,56 +148,60 @@ class Search:
     # Single effects
 
     def _fit_singles(self) -> list[Fit]:
-        """Fit the nominal plant and each promising effect alone."""
+        """Fit the nominal plant and each promising effect alone, the best fit first."""
         self.screened = self.threads.map(self.coarse.screen, self.effects)
-        nothing = self.fine.refit_with_tolerances(self.fine.nothing)
-        self._add([nothing])
-        limit = self.posterior.prices.ordinary
-        self.on_first_look(look_first(self.coarse, self.screened, 2.0 * limit, self.thresholds))
-        most = max((each.promise for each in self.screened), default=0.0)
-        worth = self.thresholds.promising * max(most, 2.0 * limit)
-        promising = [each for each in self.screened if each.promise >= worth]
+        self._add([self.fine.refit_with_tolerances(self.fine.nominal_fit)])
+        # Prices are in nats; a chi-square is twice as large.
+        price = 2.0 * self.posterior.prices.ordinary
+        self.on_first_look(look_first(self.coarse, self.screened, price, self.thresholds))
+        most = max((screened.promise for screened in self.screened), default=0.0)
+        least = self.thresholds.promising_share * max(most, price)
+        promising = [screened for screened in self.screened if screened.promise >= least]
         singles = sorted(self.threads.map(self._fit_single, promising), key=lambda f: f.misfit)
         if singles:
-            gain = max(self.coarse.nothing.misfit - singles[0].misfit, 0.0)
-            near = singles[0].misfit + self.thresholds.near * gain + 4.0 * limit
-            # A hypothesis far behind stays there, however the tolerances are taken.
-            settled = [fit for fit in singles[:SETTLED] if fit.misfit <= near]
+            gain = max(self.coarse.nominal_fit.misfit - singles[0].misfit, 0.0)
+            most = singles[0].misfit + self.thresholds.precise_fit_shortfall * gain + 2.0 * price
+            # Tolerances estimated at the fit change a misfit too little to let a distant hypothesis
+            # catch up.
+            settled = [fit for fit in singles[:SETTLED] if fit.misfit <= most]
             self._settle(settled)
             self._add([fit for fit in singles[: 2 * SETTLED] if fit not in settled])
         return singles
 
     def _fit_single(self, screened: Screened) -> Fit:
-        """Fit an effect alone; where a joint swings freely, also from what its forces take."""
+        """Fit an effect alone; for a free joint also from the balance of forces."""
         fit = self.coarse.fit_one(screened)
         if screened.effect.kind.name in REGULAR:
-            others = [
+            balanced = [
                 self.coarse.refine(*start)
                 for start in start_balanced(self.coarse, (screened.effect,))
             ]
-            fit = min(fit, *others, key=lambda each: each.misfit) if others else fit
+            fit = min(fit, *balanced, key=lambda fit: fit.misfit) if balanced else fit
         return fit
 
-    def _swings_freely(self) -> bool:
-        """Whether a joint goes by itself, so that a single effect may fit at more than one value,
-        and one effect may pass for another."""
+    def _has_free_joint(self) -> bool:
+        """Return whether a joint moves freely.
+
+        The misfit of its motion may have several minima in one value, and one effect may resemble
+        another.
+        """
         return self.coarse.evidence.missing_force(self.coarse.plant) is not None
 
     def _has_gap(self, singles: Sequence[Fit]) -> bool:
-        """Whether anything is worth more than its price, or the rest is more than noise."""
+        """Return whether an effect is worth its price, or the residual more than noise."""
         posterior = self.posterior
         return bool(posterior.best.fit.effects) or (
             bool(singles)
             and (
-                self.coarse.nothing.misfit - singles[0].misfit > 2.0 * posterior.prices.ordinary
-                or posterior.rest > self.thresholds.rest
+                self.coarse.nominal_fit.misfit - singles[0].misfit > 2.0 * posterior.prices.ordinary
+                or posterior.residual_excess > self.thresholds.residual_excess
             )
         )
 
     # The pool
 
     def _add(self, fits: Sequence[Fit]) -> None:
-        """Score fits; of each set of effects the best fit is kept."""
+        """Score fits, and keep the fit of least misfit for each set of effects."""
         for scored in self.threads.spread(self._scorer.score, fits):
             key = frozenset(scored.fit.effects)
             known = self.pool.get(key)
@@ -188,13 +209,13 @@ class Search:
                 self.pool[key] = scored
 
     def _settle(self, fits: Sequence[Fit]) -> None:
-        """Fit with the tolerances taken at the fit, on fine evidence, and score."""
+        """Refit with the tolerances estimated at the fit, on fine evidence, and score."""
         self._add(self.threads.map(self.fine.refit_with_tolerances, fits))
 
     # Sets of effects
 
     def _fit_regulars(self) -> None:
-        """Fit what nearly every machine has together, and sets of it with fewer effects."""
+        """Fit the regular effects together, and subsets of them."""
         price = self.posterior.prices.ordinary
         chosen = choose_regulars(self.effects, self.screened, price)
         if len(chosen) > 1:
@@ -202,8 +223,11 @@ class Search:
             self._keep([whole, *self._refine(reduced)])
 
     def _climb(self) -> None:
-        """Extend the best hypotheses by one effect as long as better ones are found; where that
-        fails, vary them."""
+        """Extend the best hypotheses by one effect as long as better ones are found.
+
+        A leader whose extension fails is varied. The climb ends after two rounds without a better
+        hypothesis, or where the residual could pay for no further effect.
+        """
         steady = 0
         while steady < STEADY_ROUNDS:
             before = self.posterior.best
@@ -211,48 +235,58 @@ class Search:
                 return
             self._extend(leader)
             if not self._improved(before):
-                if not self.posterior.leaves_something:
+                if not self.posterior.has_unexplained_residual:
                     return
                 self._vary(leader, VARIED)
             steady = 0 if self._improved(before) else steady + 1
 
     def _improved(self, before: Scored) -> bool:
-        """Whether the best hypothesis is better than another by more than a tie."""
+        """Return whether the best hypothesis beats another by more than a tie.
+
+        Differences below half a temper, a factor of 0.6 in weight, count as ties.
+        """
         posterior = self.posterior
         return posterior.ranking[0].cost < posterior.cost(before) - 0.5 * posterior.temper
 
     def _next_leader(self) -> Fit | None:
-        """The best hypothesis that was not extended yet, or the best with dry friction."""
-        ranked = [each.scored.fit for each in self.posterior.ranking if math.isfinite(each.cost)]
-        ranked = [fit for fit in ranked if fit.effects]
+        """Return the most promising hypothesis that was not extended yet, None if there is none."""
+        ranked = self._ranked_fits()
         if not ranked:
             return None
-        # A hypothesis that explains much less than the best one leads nowhere.
-        nothing, best = self.pool[frozenset()].fit.misfit, min(fit.misfit for fit in ranked)
-        most = best + BEHIND * max(nothing - best, 0.0)
-        longest = len(ranked[0].effects) + AHEAD
+        # A hypothesis that explains much less than the closest one is not worth extending.
+        nominal, least = self.pool[frozenset()].fit.misfit, min(fit.misfit for fit in ranked)
+        most = least + LEADER_SHORTFALL * max(nominal - least, 0.0)
+        longest = len(ranked[0].effects) + LONGER
         near = [fit for fit in ranked if fit.misfit <= most and len(fit.effects) <= longest]
-        through = [f for f in near if any(e.kind.name == GATEWAY for e in f.effects)]
-        # A step on the way may not be worth its price yet: the closest fits lead on as well.
+        dry = [f for f in near if any(e.kind.name == GATEWAY for e in f.effects)]
+        # The closest fit is a leader even if its effects are not worth their price yet: the next
+        # effect may make them so.
         closest = sorted(near, key=lambda fit: fit.misfit)
-        leaders = (ranked[0], *closest[:1], *near[: self.thresholds.leaders], *through[:1])
+        leaders = (ranked[0], *closest[:1], *near[: self.thresholds.leaders], *dry[:1])
         for fit in leaders:
             if frozenset(fit.effects) not in self._extended:
                 return fit
         return None
 
+    def _ranked_fits(self) -> list[Fit]:
+        """Return the fits of finite cost with at least one effect, the best first."""
+        ranking = self.posterior.ranking
+        fits = [weighted.scored.fit for weighted in ranking if math.isfinite(weighted.cost)]
+        return [fit for fit in fits if fit.effects]
+
     def _extend(self, leader: Fit) -> None:
         """Fit a hypothesis with one more effect."""
         self._extended.add(frozenset(leader.effects))
-        limit = self.posterior.prices.ordinary
+        price = 2.0 * self.posterior.prices.ordinary
         proposals = choose_distinct(
-            propose_additions(self.coarse, leader, self.effects, 2.0 * limit, self.threads),
+            propose_additions(self.coarse, leader, self.effects, price, self.threads),
             self.thresholds.additions,
         )
         fits = self.threads.map(
-            lambda each: self.coarse.refine(each.effects, each.values, each.space), proposals
+            lambda proposal: self.coarse.refine(proposal.effects, proposal.values, proposal.space),
+            proposals,
         )
-        if self.posterior.leaves_something:
+        if self.posterior.has_unexplained_residual:
             fits += self._refine(
                 [
                     *start_in_series(self.coarse, leader, self.effects, self.pool.keys()),
@@ -262,16 +296,15 @@ class Search:
         self._keep(fits)
 
     def _vary(self, leader: Fit, count: int) -> None:
-        """Fit a hypothesis with each effect left out, and with each replaced by so many others that
-        resemble it."""
-        limit = 2.0 * self.posterior.prices.ordinary
+        """Fit a hypothesis without each effect, and with each replaced by `count` others."""
+        price = 2.0 * self.posterior.prices.ordinary
         starts: list[Start] = []
         if len(leader.effects) > 1:
-            # An effect whose loss costs far more than its price is not worth a fit without it.
+            # An effect that is missed by far more than its price need not be left out in a fit.
             starts += [
                 (rest, values)
                 for misfit, rest, values in Linearised(self.coarse, leader).leave_out_each()
-                if misfit - leader.misfit < MISSED * limit
+                if misfit - leader.misfit < MISSED * price
             ]
         starts += propose_replacements(self.coarse, leader, self.effects, count, self.threads)
         starts += start_regular_instead(self.coarse, leader, self.effects)
@@ -288,13 +321,13 @@ class Search:
             self._vary(self.posterior.best.fit, COMPARED)
 
     def _refine(self, starts: Sequence[Start]) -> list[Fit]:
-        """Fit from starts that were not tried before."""
-        fresh = [start for start in dict.fromkeys(starts) if start not in self._tried]
-        self._tried.update(fresh)
+        """Fit from the starts that were not fitted before."""
+        fresh = [start for start in dict.fromkeys(starts) if start not in self._started]
+        self._started.update(fresh)
         return self.threads.map(lambda start: self.coarse.refine(*start), fresh)
 
     def _keep(self, fits: Sequence[Fit]) -> None:
-        """Settle the most promising of some coarse fits of each size, and score all others."""
+        """Refit the most promising coarse fits precisely, and score the next ones as they are."""
         if not fits:
             return
         price = 2.0 * self.posterior.prices.ordinary
@@ -308,19 +341,18 @@ class Search:
         self._settle(near)
         self._add([fit for fit in ranked if fit not in near])
 
-    # Where much is left
+    # Restarts
 
     def _restart(self) -> None:
         """Fit the best hypotheses from other values and at other components.
 
-        Stick-slip has more than one best place, and the values of the first effect alone may lie in
-        the valley of another.
+        Stick-slip gives the misfit several minima. An effect that was fitted alone may have settled
+        in the minimum that belongs to another effect.
         """
-        leaders = [each.scored.fit for each in self.posterior.ranking if math.isfinite(each.cost)]
-        leaders = [fit for fit in leaders if fit.effects][: self.thresholds.leaders]
+        leaders = self._ranked_fits()[: self.thresholds.leaders]
         coarse, known = self.coarse, self.pool.keys()
-        again = self.threads.spread(lambda fit: start_otherwise(coarse, fit), leaders)
-        starts = [start for each in again for start in each]
+        restarts = self.threads.spread(lambda fit: start_otherwise(coarse, fit), leaders)
+        starts = [start for restart in restarts for start in restart]
         for fit in leaders[:1]:
             starts += start_elsewhere(coarse, fit, self.effects, known)
         self._keep(self._refine(starts))
@@ -328,11 +360,12 @@ class Search:
             self._extend(fit)
 
     def _choose_beginnings(self) -> list[Fit]:
-        """Choose the best single effects that were not extended yet, and the same where the forces
-        along the measured motion put them.
+        """Choose single effects from which the search begins again.
 
-        What explains most alone, and what was found beside it, may resemble two others together;
-        and a joint that swings freely has more than one best place for a single effect.
+        They are the best ones that were not extended yet, and the best regular ones at the values
+        with which the forces along the measured motion balance. The best single effect and its
+        extensions may resemble two other effects together. The misfit of a free joint may have
+        several minima in one value.
         """
         singles = sorted(
             (scored.fit for effects, scored in self.pool.items() if len(effects) == 1),

@@ -1,5 +1,9 @@
-"""Where fits of sets of effects start: sets and values that a search would not come to by adding
-one effect after another."""
+"""Starts of fits that a search would not reach by adding one effect after another.
+
+A start is a set of effects and their values. Each function of this module adds starts for one
+reason why the stepwise search fails: effects in series, effects of second order, two delays in one
+loop, rare effects, the same kind at another component, and several minima of the misfit.
+"""
 
 from __future__ import annotations
 
@@ -8,24 +12,26 @@ from collections.abc import Collection, Sequence
 from itertools import combinations, product
 
 from rigtwin.components import Effect, Guide
-from rigtwin.diagnosis.fit import Fit, Values, clashes, is_possible, with_values, without_each
+from rigtwin.diagnosis.fit import Fit, Values, clashes, is_possible, leave_one_out, with_values
 from rigtwin.diagnosis.fitter import Fitter
 from rigtwin.diagnosis.prices import is_rare
 
 Start = tuple[tuple[Effect, ...], Values]
-"""Effects, and the values that a fit starts from."""
+"""Effects, and the values from which they are fitted."""
 REGULAR = ("coulomb", "viscous", "stiffness", "mass", "armature", "offset")
-"""Kinds that nearly every machine has more or less of."""
+"""Kinds that nearly every machine has to some degree."""
 GATEWAY = "coulomb"
-"""Kind without which a play, a spring or a Stribeck peak in series with it does nothing."""
+"""Kind without which a play, a spring or a Stribeck peak in series has no response."""
 LATE_BY_TIME = ("lag", "delay")
-"""Kinds of one parameter, the time by which a signal is late."""
+"""Kinds with a single parameter, the delay of a signal."""
 IN_SERIES = ("compliance", "backlash")
-"""Kinds in series with dry friction that hide it."""
+"""Kinds that hide dry friction in series with them."""
 SECOND_ORDER = ("two_lags", "resonance")
-"""Kinds that a lag together with a delay resembles."""
-COMBINATIONS, FOLLOWED = 150, 2
-"""Combinations of starts that are tried of one hypothesis at most, and those that are fitted."""
+"""Kinds that a lag together with a delay resembles at low frequencies."""
+COMBINATIONS = 150
+"""Largest number of combinations of starts that are simulated for one hypothesis."""
+REFINED = 2
+"""Number of these combinations that are fitted."""
 
 
 def start_in_series(
@@ -34,114 +40,162 @@ def start_in_series(
     candidates: Sequence[Effect],
     known: Collection[frozenset[Effect]],
 ) -> list[Start]:
-    """Start pairs of dry friction and what is in series with it.
+    """Start pairs of dry friction and a spring or play in series with it.
 
-    Friction behind a soft spring hardly resembles friction alone, nor does a play resemble one
-    behind a spring, so that both values of a pair are tried together.
+    The response to friction behind a soft spring differs from that to friction alone, and so does
+    that to a play behind a spring. Therefore both values of a pair are varied together.
 
     Parameters
     ----------
     fitter
         Fitter of the evidence.
     leader
-        Fit beside whose effects the pair is tried.
+        Fit to which the pair is added.
     candidates
-        Effects that are searched.
+        Candidate effects.
     known
-        Sets of effects that were fitted already.
+        Sets of effects that are already scored.
 
     Returns
     -------
     list of pairs
-        Effects, and the best of all pairs of their starts.
+        Effects, and the best combination of the pair's starts.
     """
-    found = []
-    gates = [each for each in candidates if each.kind.name == GATEWAY and each.of is Guide]
+    starts = []
+    gates = [effect for effect in candidates if effect.kind.name == GATEWAY and effect.of is Guide]
     for gate in gates:
         series = [gate] + [
-            each for each in candidates if each.group == gate.group and each.kind.name in IN_SERIES
+            effect
+            for effect in candidates
+            if effect.group == gate.group and effect.kind.name in IN_SERIES
         ]
         for pair in combinations(series, 2):
-            rest = [
+            fitted = [
                 (effect, values)
                 for effect, values in zip(leader.effects, leader.values, strict=True)
                 if effect not in pair
             ]
-            kept = tuple(effect for effect, _ in rest)
-            rubs = gate in pair or gate in kept
+            remaining = tuple(effect for effect, _ in fitted)
+            # A spring or play without dry friction has no response.
+            has_friction = gate in pair or gate in remaining
             if (
-                rubs
-                and frozenset((*kept, *pair)) not in known
-                and not any(clashes(each, kept) for each in pair)
+                has_friction
+                and frozenset((*remaining, *pair)) not in known
+                and not any(clashes(effect, remaining) for effect in pair)
             ):
-                values = tuple(values for _, values in rest)
-                found.append(_start_pair(fitter, kept, values, pair))
-    return found
+                values = tuple(values for _, values in fitted)
+                starts.append(_start_pair(fitter, remaining, values, pair))
+    return starts
 
 
 def start_unfolded(fitter: Fitter, leader: Fit, candidates: Sequence[Effect]) -> list[Start]:
-    """Start a lag and a delay in the place of an effect of second order, which they resemble at low
-    frequencies; parameters as of `start_in_series`."""
-    found = []
-    for effect, rest, values in without_each(leader):
+    """Start a lag and a delay in the place of an effect of second order.
+
+    At low frequencies two lags or a resonance delay a signal as a lag and a delay together do.
+
+    Parameters
+    ----------
+    fitter
+        Fitter of the evidence.
+    leader
+        Fit whose effects of second order are replaced.
+    candidates
+        Candidate effects.
+
+    Returns
+    -------
+    list of pairs
+        Effects, and the values from which they are fitted.
+    """
+    starts = []
+    for effect, remaining, values in leave_one_out(leader):
         pair = [
-            each
-            for each in candidates
-            if each.group == effect.group and each.kind.name in ("lag", "delay")
+            candidate
+            for candidate in candidates
+            if candidate.group == effect.group and candidate.kind.name in LATE_BY_TIME
         ]
         if (
             effect.kind.name in SECOND_ORDER
             and len(pair) == 2
-            and not any(clashes(each, rest) for each in pair)
+            and not any(clashes(candidate, remaining) for candidate in pair)
         ):
-            found.append(_start_pair(fitter, rest, values, (pair[0], pair[1])))
-    return found
+            starts.append(_start_pair(fitter, remaining, values, (pair[0], pair[1])))
+    return starts
 
 
 def _start_pair(
     fitter: Fitter, effects: Sequence[Effect], values: Values, pair: tuple[Effect, Effect]
 ) -> Start:
-    """A pair of effects beside others, at the best of all pairs of their starts."""
+    """Start a pair of effects beside others at the best combination of the pair's starts."""
     both = (*effects, *pair)
-    one, two = (fitter.starts(effect).values for effect in pair)
-    starts = [(*values, *start) for start in product(one, two)]
+    first, second = (fitter.starts(effect).values for effect in pair)
+    starts = [(*values, *start) for start in product(first, second)]
     return both, min(starts, key=lambda start: _misfit(fitter, both, start))
 
 
 def start_merged(leader: Fit) -> list[Start]:
-    """Start one lag or delay in the place of two: in a loop only their sum can be seen, and the
-    data may be explained by either alone; parameters as of `start_in_series`."""
-    found = []
-    for effect, rest, values in without_each(leader):
+    """Start one lag or delay in the place of two.
+
+    In a closed loop only the sum of two delays is observable, so that either alone, with the sum of
+    both times, may explain the data.
+
+    Parameters
+    ----------
+    leader
+        Fit whose lags and delays are merged.
+
+    Returns
+    -------
+    list of pairs
+        Effects, and the values from which they are fitted.
+    """
+    starts = []
+    for effect, remaining, values in leave_one_out(leader):
         if effect.kind.name not in LATE_BY_TIME:
             continue
         time = leader.values[leader.effects.index(effect)][0]
-        for number, other in enumerate(rest):
-            if other.kind.name in LATE_BY_TIME:
+        for number, member in enumerate(remaining):
+            if member.kind.name in LATE_BY_TIME:
                 both = ((values[number][0] + time),)
-                found.append((rest, (*values[:number], both, *values[number + 1 :])))
-    return found
+                starts.append((remaining, (*values[:number], both, *values[number + 1 :])))
+    return starts
 
 
 def start_regular_instead(fitter: Fitter, leader: Fit, candidates: Sequence[Effect]) -> list[Start]:
-    """Start each regular effect in the place of a rare one of its component, however unlike they
-    are: what few machines have has to be compared with what all have; parameters as of
-    `start_in_series`."""
-    found: list[Start] = []
-    for effect, rest, values in without_each(leader):
+    """Start each regular effect in the place of a rare effect of the same component.
+
+    A rare effect must be compared with the regular ones even if their responses differ.
+
+    Parameters
+    ----------
+    fitter
+        Fitter of the evidence.
+    leader
+        Fit whose rare effects are replaced.
+    candidates
+        Candidate effects.
+
+    Returns
+    -------
+    list of pairs
+        Effects, and the values from which they are fitted.
+    """
+    starts: list[Start] = []
+    for effect, remaining, values in leave_one_out(leader):
         if not is_rare(effect):
             continue
-        for other in candidates:
+        for candidate in candidates:
             if (
-                other.group == effect.group
-                and other.kind.name in REGULAR
-                and other not in rest
-                and not clashes(other, rest)
-                and is_possible((*rest, other), fitter.plant)
+                candidate.group == effect.group
+                and candidate.kind.name in REGULAR
+                and candidate not in remaining
+                and not clashes(candidate, remaining)
+                and is_possible((*remaining, candidate), fitter.plant)
             ):
-                start = min(fitter.starts(other).values, key=lambda each: abs(each[0]))
-                found.append(((*rest, other), (*values, start)))
-    return found
+                # The smallest start disturbs the fitted values least.
+                start = min(fitter.starts(candidate).values, key=lambda start: abs(start[0]))
+                starts.append(((*remaining, candidate), (*values, start)))
+    return starts
 
 
 def start_elsewhere(
@@ -150,34 +204,64 @@ def start_elsewhere(
     candidates: Sequence[Effect],
     known: Collection[frozenset[Effect]],
 ) -> list[Start]:
-    """Start each effect in turn at every other component that may have it; parameters as of
-    `start_in_series`."""
-    found = []
-    for number, effect in enumerate(leader.effects):
-        kept = (*leader.effects[:number], *leader.effects[number + 1 :])
-        for other in candidates:
-            effects = (*leader.effects[:number], other, *leader.effects[number + 1 :])
+    """Start each effect in turn at every other component that may have it.
+
+    Parameters
+    ----------
+    fitter
+        Fitter of the evidence.
+    leader
+        Fit whose effects are moved in turn.
+    candidates
+        Candidate effects.
+    known
+        Sets of effects that are already scored.
+
+    Returns
+    -------
+    list of pairs
+        Effects, and the values of the leader.
+    """
+    starts = []
+    for number, (effect, remaining, _) in enumerate(leave_one_out(leader)):
+        for candidate in candidates:
+            effects = (*leader.effects[:number], candidate, *leader.effects[number + 1 :])
             if (
-                other != effect
-                and other.kind == effect.kind
-                and not clashes(other, kept)
+                candidate != effect
+                and candidate.kind == effect.kind
+                and not clashes(candidate, remaining)
                 and is_possible(effects, fitter.plant)
                 and frozenset(effects) not in known
             ):
-                found.append((effects, leader.values))
-    return found
+                starts.append((effects, leader.values))
+    return starts
 
 
 def start_otherwise(fitter: Fitter, fit: Fit) -> list[Start]:
-    """Start the effects of a fit at the best combinations of their own starts; none where there are
-    too many."""
+    """Start the effects of a fit at the best combinations of their single starts.
+
+    Parameters
+    ----------
+    fitter
+        Fitter of the evidence.
+    fit
+        Fit whose effects are started again.
+
+    Returns
+    -------
+    list of pairs
+        Effects, and the values from which they are fitted. Empty where there are too many
+        combinations.
+    """
     starts = [fitter.starts(effect).values for effect in fit.effects]
-    if math.prod(len(each) for each in starts) > COMBINATIONS:
+    # The number of combinations grows exponentially with that of the effects.
+    if math.prod(len(values) for values in starts) > COMBINATIONS:
         return []
     ranked = sorted(product(*starts), key=lambda values: _misfit(fitter, fit.effects, values))
-    return [(fit.effects, values) for values in ranked[:FOLLOWED]]
+    return [(fit.effects, values) for values in ranked[:REFINED]]
 
 
 def _misfit(fitter: Fitter, effects: Sequence[Effect], values: Values) -> float:
+    """Return the misfit of effects with given values, without fitting them."""
     plant = with_values(fitter.plant, effects, values)
     return fitter.space.misfit(fitter.evidence.residual(plant))

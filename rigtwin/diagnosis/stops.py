@@ -1,5 +1,7 @@
-"""Limits that a recording reaches: stops at the ends of a joint's range, which models of joints
-that act on each other lack, and commands that an actuator does not take."""
+"""Limits that a recording reaches: stops at the ends of a joint's range, and limits of commands.
+
+Models of coupled joints have no stops, so that contact with one would be diagnosed as an effect.
+"""
 
 from __future__ import annotations
 
@@ -13,31 +15,33 @@ from rigtwin.description.mechanism import Mechanism
 from rigtwin.recording import Recording
 
 NEAR = 1e-3
-"""Share of its range within which of its end a joint is at a stop."""
+"""Distance from an end of the range, as a share of it, within which a joint is at a stop."""
 
 
 def find_stops(machine: Machine, recordings: Sequence[Recording]) -> list[str]:
-    """Which joints come to a stop that nothing predicts.
+    """Find joints that reach a stop which the model does not predict.
 
     Parameters
     ----------
     machine
-        Its description.
+        Described machine.
     recordings
-        Of it.
+        Recordings of the machine.
 
     Returns
     -------
     list of str
-        A line for each joint and recording.
+        One line for each joint and recording.
     """
     if not machine.physics.lacks_stops:
         return []
     model = Mechanism(machine.model).model
-    found = []
+    notes = []
     for name, component in machine.components.items():
         if measures(getattr(machine.plant, name)) != "position" or len(component.acts_on) != 1:
             continue
+        # A sensor may count against its joint. The coefficient is negative then, and sorting puts
+        # the transformed ends in order.
         joint, coefficient = component.acts_on[0]
         number = model.joint(joint).id
         if not model.jnt_limited[number] or component.channel is None:
@@ -49,30 +53,30 @@ def find_stops(machine: Machine, recordings: Sequence[Recording]) -> list[str]:
             if at_stop.any():
                 first = int(np.argmax(at_stop))
                 end = high if place[first] > 0.5 * (low + high) else low
-                found.append(
+                notes.append(
                     f"{recording.path.name}: {name} is at {place[first]:.4g} {component.unit} "
                     f"after {first * recording.period:.3g} s, and joint {joint} ends at {end:.4g}: "
                     "no stop is predicted"
                 )
-    return found
+    return notes
 
 
 def find_cut_commands(machine: Machine, recordings: Sequence[Recording]) -> list[str]:
-    """Which commands go beyond what their actuators take.
+    """Find commands that exceed the limits of their actuators.
 
     Parameters
     ----------
     machine
-        Its description.
+        Described machine.
     recordings
-        Of it.
+        Recordings of the machine.
 
     Returns
     -------
     list of str
-        A line for each actuator and recording.
+        One line for each actuator and recording.
     """
-    found = []
+    notes = []
     for name, component in machine.components.items():
         actuator = getattr(machine.plant, name)
         if not isinstance(actuator, (*PUSHERS, PositionActuator)):
@@ -86,8 +90,8 @@ def find_cut_commands(machine: Machine, recordings: Sequence[Recording]) -> list
             command = recording.column(*component.channel)
             beyond = float(np.mean((command < low) | (command > high)))
             if beyond > 0.0:
-                found.append(
+                notes.append(
                     f"{recording.path.name}: {name} takes commands from {low:g} to {high:g}, and "
                     f"{100.0 * beyond:.3g} % of the ticks are beyond: they are cut off there"
                 )
-    return found
+    return notes

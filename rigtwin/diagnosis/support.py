@@ -1,4 +1,4 @@
-"""What the confidence in an effect rests on."""
+"""Support of a named effect: the figures on which its confidence rests."""
 
 from __future__ import annotations
 
@@ -7,30 +7,29 @@ from dataclasses import dataclass
 import numpy as np
 
 CALIBRATION = ((0.0, 0.0), (0.5, 0.5), (0.8, 0.8), (0.95, 0.93), (0.999, 0.98), (1.0, 0.98))
-"""Probability → confidence. Chosen by hand and close to the diagonal; not fitted to the referees
-yet (docs/confidence.md)."""
+"""Pairs of probability and confidence, interpolated linearly. They are chosen by hand close to the
+diagonal, and not fitted to the referees yet (docs/confidence.md)."""
 
 
 @dataclass(frozen=True)
 class Support:
-    """What the confidence in an effect rests on.
+    """Figures on which the confidence in an effect rests.
 
-    Parameters
+    Attributes
     ----------
     probability
-        Weight of all hypotheses with this effect.
+        Weight of all hypotheses with this effect, 0 to 1.
     margin
-        Nats by which the best hypothesis without it, and without what the data cannot tell from it,
-        is worse.
+        Nats by which the best hypothesis without the effect and its rivals is worse.
     steadiness
-        Standard errors by which its magnitude differs from the nominal value.
+        Standard errors by which the effect's magnitude differs from its nominal value.
     remains
-        Share of the gap's amplitude that is left in the signals that it acts on.
+        Share of the gap's amplitude that remains in the signals on which the effect acts.
     dominance
-        Amplitude that it alone accounts for, relative to what is left beyond noise and declared
-        error in the signals that it acts on; 0.001 to 1000.
+        Amplitude that the effect accounts for, relative to the residual beyond noise and declared
+        error in the signals on which it acts; 0.001 to 1000.
     mimic
-        Probability that it only resembles something that has no name.
+        Probability that the effect only resembles an unnamed effect.
     """
 
     probability: float
@@ -42,6 +41,7 @@ class Support:
 
     @property
     def confidence(self) -> float:
-        """Probability that this effect is there, a mimic excluded."""
-        said, right = zip(*CALIBRATION, strict=True)
-        return float(np.interp(self.probability * (1.0 - self.mimic), said, right))
+        """Calibrated probability that the effect is present and is no mimic."""
+        probabilities, confidences = zip(*CALIBRATION, strict=True)
+        likely = self.probability * (1.0 - self.mimic)
+        return float(np.interp(likely, probabilities, confidences))

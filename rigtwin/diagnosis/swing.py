@@ -1,4 +1,4 @@
-"""How far and how fast the commands of some recordings went."""
+"""Size and rate of the commands in recordings."""
 
 from __future__ import annotations
 
@@ -12,8 +12,23 @@ from rigtwin.recording import Recording
 
 
 def swings(machine: Machine, recordings: Sequence[Recording]) -> dict[str, Swing]:
-    """The swing of each command over all recordings, by the component that it moves."""
-    found: dict[str, Swing] = {}
+    """Return the swing of each command over all recordings.
+
+    Saturations and rate limits start from it: a limit that the commands never reach has no effect.
+
+    Parameters
+    ----------
+    machine
+        Machine the recordings belong to.
+    recordings
+        Recordings fitted jointly.
+
+    Returns
+    -------
+    dict
+        Quantiles of a command's size and rate, by the component that it moves.
+    """
+    by_component: dict[str, Swing] = {}
     for component in machine.components.values():
         if component.channel is None or component.channel[0] != "/command":
             continue
@@ -26,6 +41,6 @@ def swings(machine: Machine, recordings: Sequence[Recording]) -> dict[str, Swing
             continue
         size = np.concatenate([np.abs(column) for column, _ in columns])
         rate = np.concatenate([np.abs(np.diff(column)) / period for column, period in columns])
-        largest, fastest = (tuple(np.quantile(each, SHARES).tolist()) for each in (size, rate))
-        found[component.name] = Swing(largest, fastest)
-    return found
+        largest, fastest = (tuple(np.quantile(part, SHARES).tolist()) for part in (size, rate))
+        by_component[component.name] = Swing(largest, fastest)
+    return by_component

@@ -1,8 +1,12 @@
-"""Every number that decides what a diagnosis says.
+"""Thresholds and prices that decide what a diagnosis says.
 
-They were set by hand on the recordings that docs/diagnosis.md lists, and are not calibrated on the
-referees yet (docs/confidence.md). "Nats" are units of log likelihood: a hypothesis that is better
-by one nat is e times as likely.
+The values were set by hand on the recordings listed in docs/diagnosis.md. They are not calibrated
+on the referees yet (docs/confidence.md).
+
+A nat is the unit of log likelihood: a hypothesis that is better by one nat is e times as likely. A
+price in nats is the gain in log predictive density that an effect must bring to be worth adding.
+Where the model is rough, the residual left by all hypotheses is correlated, and a parameter absorbs
+some of it by chance. Prices named "per independent sample" grow with the amount of such data.
 """
 
 from __future__ import annotations
@@ -12,123 +16,129 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Thresholds:
-    """Numbers of the search, of the score of a hypothesis, and of the words of the answer."""
+    """Thresholds of the search, of the score of a hypothesis, and of the wording of the answer."""
 
-    # The search.
-    promising: float = 0.1
-    """Share of the best effect's promise that another must reach to be fitted alone."""
-    near: float = 0.2
-    """Share of what the best effect explains that another may lack to be fitted precisely."""
+    # The search: which effects are fitted, and which fits are extended.
+    promising_share: float = 0.1
+    """An effect is fitted alone if its promise reaches this share of the largest promise."""
+    precise_fit_shortfall: float = 0.2
+    """Single effects are refitted precisely if they explain at most this share less than the best
+    single effect."""
     leaders: int = 3
-    """Hypotheses of each round that are extended by one more effect."""
+    """Number of hypotheses considered for extension in each round."""
     additions: int = 6
-    """Further effects that are fitted beside each leader."""
+    """Number of further effects fitted beside each leader."""
 
-    # The score of a hypothesis.
+    # The score of a hypothesis: the price of its effects.
     occam_quiet: float = 15.0
-    """Nats that an effect must gain where noise alone is left."""
+    """Price of an effect where only noise remains, nats."""
     occam_discrepant: float = 5.0
-    """Nats that an effect must gain where an unexplained rest dominates."""
+    """Price of an effect where an unexplained residual dominates, nats."""
     materiality: float = 0.0075
-    """Nats per independent sample that an effect must gain where noise alone is left: a smaller
+    """Further price of an effect where only noise remains, nats per independent sample. A smaller
     effect would not be noticed in any test."""
     discrepancy_price: float = 0.06
-    """Nats per independent sample of one signal that each parameter must gain where an unexplained
-    rest dominates. A parameter absorbs some of any rest, also where it means nothing."""
+    """Price of each parameter where an unexplained residual dominates, nats per independent sample
+    of one signal. A parameter absorbs some of any residual, also where it has no physical cause."""
     shape_price: float = 4.0
-    """Nats that each parameter of an effect costs besides the first."""
+    """Price of each parameter of an effect after the first, nats."""
     rare_odds: float = 5.0
-    """Nats that a rare effect must gain in addition."""
+    """Further price of a rare effect, nats."""
     rare_price: float = 0.06
-    """Nats per independent sample of one signal that a rare effect must gain in addition where an
-    unexplained rest dominates."""
-    rare_share: float = 0.11
+    """Further price of a rare effect where an unexplained residual dominates, nats per independent
+    sample of one signal."""
+    rare_amplitude_share: float = 0.11
     """Share of the signals' amplitude that a rare effect should account for."""
-    rare_doubt: float = 0.3
-    """Nats per independent sample of one signal that a rare effect costs which accounts for none of
-    it, where an unexplained rest dominates."""
-    material: float = 2.0
-    """Declared model errors that an effect should account for where that error is spread evenly;
-    below it the price rises over one such error."""
-    steady: float = 4.0
+    rare_immaterial_price: float = 0.3
+    """Price of a rare effect that accounts for none of the signals' amplitude, where an unexplained
+    residual dominates, nats per independent sample of one signal."""
+    material_model_errors: float = 2.0
+    """Amplitude that an effect should account for, in declared model errors, where that error is
+    spread evenly over the spectrum. Within one model error below it the price rises to
+    `prohibitive_price`."""
+    steady_standard_errors: float = 4.0
     """Standard errors by which a magnitude should differ from its nominal value."""
-    unsteady: float = 20.0
-    """Nats that the first standard error costs which a magnitude lacks; the price grows with the
-    square, and steeply once the interval holds the nominal value."""
-    forbidding: float = 50.0
-    """Nats that an effect costs at most which is immaterial, undone by another, or no more than its
-    declared tolerance."""
-    within: float = 0.3
-    """Share of its weight that the likelihood has within noise and declared error. The noise is
-    estimated from above, and what is gained within the declared error is little evidence."""
-    chance: float = 2.0
-    """Standard deviations of the power of noise in a band that are no rest."""
-    undone: float = 0.3
-    """Share of the smaller response that two effects must have together; with less they undo each
-    other, which costs nats linearly."""
-    within_tolerance: float = 2.0
-    """Declared tolerances that a change must exceed to be an effect rather than a tolerance."""
+    unsteady_price: float = 20.0
+    """Price of a magnitude that is one standard error short of `steady_standard_errors`, nats. The
+    price grows with the square of the shortfall, and steeply once the interval contains the nominal
+    value."""
+    prohibitive_price: float = 50.0
+    """Highest price of an effect that is immaterial, cancelled by another effect, or smaller than
+    its declared tolerance, nats."""
+
+    # The score of a hypothesis: its log predictive density and its weight.
+    within_noise_weight: float = 0.3
+    """Weight of the log likelihood of residuals below noise and declared error. The noise estimate
+    is an upper bound, and a gain within the declared error is weak evidence."""
+    chance_deviations: float = 2.0
+    """Power above that of noise counts as residual beyond this many standard deviations of the
+    power of noise in a band."""
+    cancelling_share: float = 0.3
+    """Two effects cancel if their joint response is below this share of the smaller single
+    response. The price grows linearly as the joint response shrinks."""
+    tolerance_half_widths: float = 2.0
+    """A change is an effect rather than a tolerance beyond this many declared half widths."""
     temper: float = 4.0
-    """Factor by which differences of log likelihood are divided where noise alone is left, because
-    no model of the noise is exact."""
+    """Divisor of differences of log likelihood where only noise remains, since no noise model is
+    exact."""
     discrepancy_temper: float = 0.02
     """Share of the independent samples of a signal that is added to `temper` where an unexplained
-    rest dominates."""
+    residual dominates."""
 
-    # The words of the answer.
-    member: float = 0.05
-    """Weight, relative to the chosen hypothesis, from which another effect is named as one that the
-    data cannot tell from it."""
-    members: float = 3.5
-    """Effective number of effects up to which those that the data cannot tell from each other are
-    named together."""
-    nameable: float = 0.5
-    """Confidence from which an effect is named."""
-    rest: float = 0.15
-    """Excess of the residual's power over noise and declared error from which something is left."""
-    explained: float = 0.8
-    """Share of the gap that "explained" must close on held-out data."""
-    removes: float = 0.106
-    """Share of the amplitude of one signal's gap that named effects must close on held-out data to
-    be named at all: a fifth of its power."""
-    mimicry: float = 0.17
-    """Share of the gap's amplitude that may be left beside an unnamed effect; with more, the named
-    effect is as likely a mere likeness of the unnamed one."""
-    worse: float = 1.05
-    """Factor of the residual's power from which held-out data reject a correction."""
-    consequence: float = 1e-3
-    """Share of the commands' amplitude below which a deviating controller setting is a note."""
-    sure: float = 0.98
+    # The wording of the answer.
+    rival_weight: float = 0.05
+    """An effect is a rival of a named effect if its hypothesis has at least this weight, relative
+    to the chosen hypothesis."""
+    rival_count: float = 3.5
+    """Largest effective number of rivals that are named together."""
+    naming_confidence: float = 0.5
+    """Lowest confidence at which an effect is named."""
+    residual_excess: float = 0.15
+    """Excess of the residual's power over noise and declared error that counts as unexplained."""
+    explained_share: float = 0.8
+    """Share of the gap on held-out data that the verdict "explained" requires to be closed."""
+    removed_share: float = 0.106
+    """Share of the amplitude of one signal's gap that named effects must close on held-out data.
+    It corresponds to a fifth of the power."""
+    mimicry_share: float = 0.17
+    """Share of the gap's amplitude that may remain beside an unnamed effect. Above it, the named
+    effect is as likely to be a mimic of the unnamed effect."""
+    worsening_factor: float = 1.05
+    """Factor of the residual's power on held-out data above which a correction is rejected."""
+    controller_consequence: float = 1e-3
+    """Share of the commands' amplitude below which a deviating controller setting is only noted."""
+    highest_confidence: float = 0.98
     """Upper bound on every confidence."""
-    unsure: float = 0.9
+    retest_confidence: float = 0.9
     """Confidence below which another test is proposed."""
-    wider: float = 2.5
-    """Standard errors in half an interval; the form of a model is never exact."""
-    aligned: float = 0.3
-    """Usual correlation of an unexplained rest with the response to an effect; it widens
+    interval_half_width: float = 2.5
+    """Standard errors in half an interval. It exceeds 1.96 since the form of a model is never
+    exact."""
+    rest_correlation: float = 0.3
+    """Typical correlation of an unexplained residual with the response to an effect. It widens
     intervals."""
-    possible: float = 0.01
-    """Weight from which another explanation is kept beside the chosen one."""
-    left_over: float = 1.3
-    """Ratio of a signal's residual to its noise from which the residual is located."""
+    alternative_weight: float = 0.01
+    """Lowest weight at which another explanation is reported beside the chosen one."""
+    localisation_ratio: float = 1.3
+    """Ratio of a signal's residual to its noise above which the residual is localised."""
 
-    # What changed between recordings.
-    changed: float = 0.01
+    # Changes between recordings.
+    change_probability: float = 0.01
     """Probability, corrected for the number of parameters, below which estimates differ."""
-    instead: float = 24.0
-    """Chi-square, in units of the residual, by which the change of another parameter may be worse
-    and still be named beside the best."""
-    seen: float = 1e-3
-    """Share of a response that nuisances must leave for a recording to tell of it."""
-    trend_explains: float = 0.8
+    rival_change_chi_square: float = 24.0
+    """The change of another parameter is named beside the best one if its chi-square, in units of
+    the residual, is larger by at most this."""
+    observable_share: float = 1e-3
+    """Share of a response that nuisance parameters must not absorb for a recording to count."""
+    trend_share: float = 0.8
     """Share of the differences between recordings that a covariate must explain."""
-    trend_clear: float = 3.0
-    """Ratio of what every other covariate leaves to what the best one leaves."""
-    changes: int = 6
-    """Parameters that may differ between recordings at most."""
-    changed_share: float = 0.03
+    trend_margin: float = 3.0
+    """Factor by which every other covariate must leave more than the best covariate."""
+    most_changes: int = 6
+    """Largest number of parameters that may differ between recordings."""
+    change_log_error: float = 0.03
     """Difference of the logarithm of the error that a change must make."""
 
 
 STANDARD = Thresholds()
-"""The thresholds that a diagnosis uses unless it is given others."""
+"""Default thresholds of a diagnosis."""

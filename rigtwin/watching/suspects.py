@@ -42,7 +42,7 @@ def find_suspects(evidence: Evidence, thresholds: Thresholds = STANDARD) -> tupl
     # An effect must lower χ² by twice the nats of its prior, as where only noise remains.
     price = 2.0 * (thresholds.occam_quiet + thresholds.materiality * evidence.expected)
     fitter, least = Fitter(searched), price
-    without = fitter.nothing
+    without = fitter.nominal_fit
     with Threads() as threads:
         screened = threads.map(fitter.screen, candidates(evidence))
         screened.sort(key=lambda candidate: -candidate.promise)
@@ -60,7 +60,9 @@ def find_suspects(evidence: Evidence, thresholds: Thresholds = STANDARD) -> tupl
     weights /= weights.sum()
     gap = max(without.misfit - evidence.expected, 1e-300)
     suspects = [
-        _suspect(fit, (without.misfit - fit.misfit) / gap, thresholds.sure * float(weight))
+        _suspect(
+            fit, (without.misfit - fit.misfit) / gap, thresholds.highest_confidence * float(weight)
+        )
         for fit, weight in zip(fits, weights, strict=True)
     ]
     suspects.sort(key=lambda suspect: -suspect.probability)

@@ -94,7 +94,7 @@ def test_an_effect_takes_the_place_of_its_own_tolerance(name, replaced):
     """With a delay to be found, when samples were taken is no question of its own."""
     effect = find(name, RigPlant())
     space = space_of(COLUMNS, USED, tolerances=TOLERANCES)
-    beside = space.beside([effect])
+    beside = space.without_replaced([effect])
     expected = np.where(replaced, 0.0, COLUMNS)
     assert np.array_equal(beside.columns, expected)
     assert np.array_equal(space.columns, COLUMNS)
