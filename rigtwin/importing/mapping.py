@@ -304,7 +304,7 @@ def _time_columns(given: object) -> tuple[str, ...]:
         return (given,)
     if isinstance(given, list) and given and all(isinstance(each, str) for each in given):
         if len(set(given)) < len(given):
-            raise RigtwinError(f"[time] column = {given}: one stands there twice")
+            raise RigtwinError(f"[time] column = {given}: a column is listed twice")
         return tuple(given)
     raise RigtwinError(f"[time] column = {given}: expected a name, or a date's and a time's")
 
