@@ -609,7 +609,7 @@ def test_a_column_of_other_numbers_is_said_with_its_cell(tmp_path: Path, cell: s
     with pytest.raises(RigtwinError) as caught:
         imported(tmp_path, "\n".join(["t,x,f", *lines]))
     said = str(caught.value)
-    assert f"column 'f' holds {cell.strip(chr(34))!r} in line 2, which was taken for a word" in said
+    assert f"it holds {cell.strip(chr(34))!r} in line 2, which was taken for a word" in said
     assert "no column" not in said
 
 
