@@ -301,7 +301,7 @@ TIED = """<equality><joint joint1="rail" joint2="pivot" polycoef="0 1 0 0 0"/></
         (
             'moved_by = ["drive"]',
             'moved_by = ["drive", "drive"]',
-            "moved_by: drive stands there twice",
+            "moved_by: drive is listed twice",
         ),
         (
             "[[replays]]",

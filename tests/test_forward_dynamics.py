@@ -265,7 +265,7 @@ def test_an_actuator_takes_no_command_beyond_its_range_whatever_its_gain(tmp_pat
     [
         ('free = "one"\nmoved_by = ["push"]\nobserve = ["x_two"]', "expected a list of joints"),
         ('free = ["ones"]\nmoved_by = ["push"]\nobserve = ["x_two"]', "'ones' is no joint"),
-        ('free = ["one", "one"]\nmoved_by = ["push"]\nobserve = ["x_one"]', "stands there twice"),
+        ('free = ["one", "one"]\nmoved_by = ["push"]\nobserve = ["x_one"]', "is listed twice"),
         ('free = ["one"]\nmoved_by = ["x_one"]\nobserve = ["x_two"]', "which is free"),
         ('free = ["one"]\nmoved_by = ["push"]\nobserve = ["x_two"]', "cannot be observed"),
         ('free = ["one"]\nmoved_by = ["apart"]\nobserve = ["x_one"]', "is of no single joint"),

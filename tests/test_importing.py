@@ -234,7 +234,7 @@ NESTED = [{"t": r["t"], "at": {"x": r["x"]}, "f": [r["f"], 0], "on": "yes"} for 
 
 def test_json_s_keys_stand_there_once(tmp_path: Path):
     (tmp_path / "a.json").write_text('{"t": [0, 1], "t": [0, 2], "x": [1, 2]}')
-    with pytest.raises(RigtwinError, match="not valid JSON: 't' stands there twice"):
+    with pytest.raises(RigtwinError, match="not valid JSON: 't' is listed twice"):
         read(tmp_path / "a.json")
 
 
@@ -386,7 +386,7 @@ BAD_MAPS = [
     (MAP.replace('unit = "mm"', 'unit = "furlong"'), "unknown unit 'furlong'"),
     (MAP.replace('unit = "mm"', "sign = 2"), "expected 1 or -1"),
     (MAP.replace('unit = "mm"', "scale = 1e308"), "expected numbers below 1e+15"),
-    (MAP.replace('column = "t"', 'column = ["t", "t"]'), "one stands there twice"),
+    (MAP.replace('column = "t"', 'column = ["t", "t"]'), "a column is listed twice"),
     (MAP.replace('unit = "mm"', "scale = 0"), "expected anything else"),
     (MAP.replace('unit = "mm"', 'scale = "2"'), "expected a number"),
     (MAP.replace('unit = "mm"', "scal = 2"), "unknown key 'scal'"),

@@ -164,7 +164,7 @@ MISTAKES = [
     (
         'moved_by = ["angle_1", "angle_2"]',
         'moved_by = ["angle_1", "angle_1"]',
-        "stands there twice",
+        "is listed twice",
     ),
     (
         'moved_by = ["angle_1", "angle_2"]',

@@ -94,7 +94,7 @@ def test_a_corrected_twin_says_how_sure_it_is(explained, tmp_path):
     assert posterior.intervals == {"rail.coulomb": (estimate.low, estimate.high)}
     assert posterior.probability == effect.confidence
     assert posterior.at_best(Configuration()).plant == explained.corrected.plant
-    for other in posterior.otherwise:
+    for other in posterior.alternatives:
         assert other.effect != "coulomb@rail"
         assert 0.01 <= other.probability <= 1.0 - posterior.probability + 0.05
         assert override(Configuration(), other.changes).plant != Configuration().plant

@@ -21,7 +21,7 @@ from rigtwin.cli import main
 from rigtwin.description.catalogue import find
 from rigtwin.description.changes import from_toml, override
 from rigtwin.description.configuration import Configuration
-from rigtwin.description.posterior import Otherwise, Posterior, format_toml, load_posterior
+from rigtwin.description.posterior import Alternative, Posterior, format_toml, load_posterior
 from rigtwin.errors import RigtwinError
 from rigtwin.recording import load
 from rigtwin.simulation.experiment import Experiment
@@ -288,7 +288,7 @@ POSTERIOR = Posterior(
     {"motor": {"coulomb": 24.0}},
     {"motor.coulomb": (22.0, 26.0)},
     0.9,
-    (Otherwise("viscous@motor", 0.05, {"motor": {"viscous": 40.0}}),),
+    (Alternative("viscous@motor", 0.05, {"motor": {"viscous": 40.0}}),),
 )
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from rigtwin.describing.quantity import JointQuantity
 from rigtwin.description.implied import movable_joints
 from rigtwin.description.mechanism import Mechanism
-from rigtwin.description.mistakes import near
+from rigtwin.description.mistakes import suggest
 from rigtwin.errors import RigtwinError
 from rigtwin.importing.columns import Columns
 from rigtwin.importing.units import unit_of
@@ -103,14 +103,14 @@ def read_corrections(
         owner, dot, name = key.rpartition(".")
         if not dot or name not in KEYS:
             known = [TIME, *(f"JOINT.{each}" for each in KEYS)]
-            raise RigtwinError(f"{where}: {key!r} cannot be stated; {near(key, known)}")
+            raise RigtwinError(f"{where}: {key!r} cannot be stated; {suggest(key, known)}")
         quantity = KEYS[name]
         if owner == ANY:
             units[quantity] = _unit(where, text)
             continue
         joint = _joint(owner, joints, mechanism)
         if joint is None:
-            raise RigtwinError(f"{where}: no joint {owner!r}; {near(owner, joints)}")
+            raise RigtwinError(f"{where}: no joint {owner!r}; {suggest(owner, joints)}")
         slots[joint, quantity] = _source(where, text.strip(), columns)
     return Corrections(time, slots, units)
 
@@ -157,5 +157,5 @@ def _source(where: str, text: str, columns: Columns) -> Stated:
     else:
         return Stated("", body, unit, 1.0)
     if not any(name in body for name in columns.values):
-        raise RigtwinError(f"{where}: no column {body!r}; {near(body, columns.values)}")
+        raise RigtwinError(f"{where}: no column {body!r}; {suggest(body, columns.values)}")
     return Stated("", body, unit, 1.0)

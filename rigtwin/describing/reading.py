@@ -21,7 +21,7 @@ from rigtwin.describing.question import Question, enumerate_names, option
 from rigtwin.describing.replay_kind import ReplayKind, choose_kind
 from rigtwin.describing.signal import LogSignal
 from rigtwin.describing.slots import Slots
-from rigtwin.description.coupling import act_on_each_other
+from rigtwin.description.coupling import are_coupled
 from rigtwin.description.implied import FORCES, INVERSE, actuator_on, movable_joints
 from rigtwin.description.mechanism import Mechanism
 from rigtwin.errors import RigtwinError
@@ -205,7 +205,7 @@ def _movers(
 
 def _band(log: Log, test: str, positions: Mapping[str, Array]) -> float | None:
     """Frequency up to which forces are judged, of joints that are replayed together."""
-    if test != INVERSE or not act_on_each_other(log.mechanism, list(positions)):
+    if test != INVERSE or not are_coupled(log.mechanism, list(positions)):
         return None
     band = motion_band(log.time(), positions)
     log.notes.append(f"forces are judged up to {band:g} Hz, by the motion of the joints")

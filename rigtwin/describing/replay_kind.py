@@ -17,7 +17,7 @@ from rigtwin.description.implied import (
     actuator_on,
 )
 from rigtwin.description.mechanism import Mechanism
-from rigtwin.description.mistakes import near
+from rigtwin.description.mistakes import suggest
 from rigtwin.errors import RigtwinError
 
 
@@ -70,7 +70,7 @@ def choose_kind(
     if stated:
         wanted = stated.replace("-", " ").replace("_", " ").strip().lower()
         if wanted not in TESTS:
-            raise RigtwinError(f"--test {stated}: {near(stated, TESTS)}")
+            raise RigtwinError(f"--test {stated}: {suggest(stated, TESTS)}")
         return ReplayKind(wanted, "as stated")
     positions = [j for j in joints if _takes_position(mechanism, j)]
     commanded = slots.joints(JointQuantity.COMMAND, joints)

@@ -1,5 +1,11 @@
-"""The force law that an MJCF gives an actuator: its delay and its filter, and what of it no
-component can express."""
+"""The force law of an MJCF actuator: its delay, its filter, and the parts that no component can
+express.
+
+MuJoCo computes an actuator's force as gain · activation + bias, where the bias of an affine
+actuator is bias₀ + bias₁ · length + bias₂ · velocity (MuJoCo documentation, "Actuation model"). A
+component of `rigtwin` expresses a part of that law; `find_obstacle` reports the first thing that it
+cannot express.
+"""
 
 from __future__ import annotations
 
@@ -13,19 +19,21 @@ NO_BIAS, AFFINE = int(mujoco.mjtBias.mjBIAS_NONE), int(mujoco.mjtBias.mjBIAS_AFF
 NO_DYNAMICS = int(mujoco.mjtDyn.mjDYN_NONE)
 FILTERS = (int(mujoco.mjtDyn.mjDYN_FILTER), int(mujoco.mjtDyn.mjDYN_FILTEREXACT))
 """Activation dynamics that are a first-order lag of the command."""
-ENOUGH = 1e-9
-"""Share of a timestep by which a history may be too short for its delay."""
+HISTORY_TOLERANCE = 1e-9
+"""Rounding error allowed between a delay and the history that holds it, as a share of a
+timestep."""
 EXPECTED = "expected <motor>, <position>, or <general> with a fixed gain"
 
 
 def lies_at_command(model: mujoco.MjModel, number: int) -> bool:
-    """Whether an actuator's force grows with its distance from a commanded position."""
+    """Return whether an actuator's force grows with its distance from a commanded position."""
+    # An affine bias with bias₁ ≠ 0 is a spring; MuJoCo's <position> has bias₁ = −kp.
     affine = int(model.actuator_biastype[number]) == AFFINE
     return affine and float(model.actuator_biasprm[number, 1]) != 0.0
 
 
 def read_timing(model: mujoco.MjModel, number: int) -> dict[str, float]:
-    """Delay and lag of an actuator's command.
+    """Return the delay and the lag of an actuator's command.
 
     Parameters
     ----------
@@ -48,25 +56,34 @@ def read_timing(model: mujoco.MjModel, number: int) -> dict[str, float]:
 
 
 def rest_position(model: mujoco.MjModel, number: int) -> dict[str, float]:
-    """Gain and offset of the joint's rest position against the command of a position actuator:
-    gear · position = (gain · command + bias₀) / −bias₁.
+    """Return gain and offset of the position at which a position actuator exerts no force.
+
+    The force is zero where gear · position = (gain · command + bias₀) / −bias₁.
+
+    Parameters
+    ----------
+    model
+        Compiled MJCF.
+    number
+        Index of the actuator.
 
     Returns
     -------
     dict of str to float
-        `gain`, 1, and `offset`, m or rad, where the joint does not rest at its command.
+        `gain`, 1, and `offset`, m or rad. A gain of 1 and an offset of 0 are omitted, so that the
+        result is empty for a joint that rests at its command.
     """
     gain, bias = float(model.actuator_gainprm[number, 0]), model.actuator_biasprm[number]
     gear = float(model.actuator_gear[number, 0])
     if not lies_at_command(model, number) or gear == 0.0:
         return {}
     share, offset = -gain / float(bias[1]) / gear, -float(bias[0]) / float(bias[1]) / gear
-    found = {} if np.isclose(share, 1.0) else {"gain": share}
-    return found | ({} if offset == 0.0 else {"offset": offset})
+    parameters = {} if np.isclose(share, 1.0) else {"gain": share}
+    return parameters | ({} if offset == 0.0 else {"offset": offset})
 
 
 def find_obstacle(model: mujoco.MjModel, number: int, kind: str) -> str | None:
-    """What of an actuator a component of this type cannot express.
+    """Return the first property of an actuator that a component of this type cannot express.
 
     Parameters
     ----------
@@ -80,13 +97,14 @@ def find_obstacle(model: mujoco.MjModel, number: int, kind: str) -> str | None:
     Returns
     -------
     str or None
-        What is wrong and what was expected; None where the component says all of it.
+        Sentence with the property and the expected value; None if the component expresses all.
     """
     if model.actuator_ctrlnum[number] != 1:
         return f"it takes {model.actuator_ctrlnum[number]} commands; expected one"
     obstacle = _find_in_timing(model, number)
     if obstacle is not None:
         return obstacle
+    # A position actuator prescribes its joint's position, so forces within it have no influence.
     if kind == "position actuator":
         return None
     for values, attribute in (
@@ -103,11 +121,12 @@ def find_obstacle(model: mujoco.MjModel, number: int, kind: str) -> str | None:
 
 def _find_in_timing(model: mujoco.MjModel, number: int) -> str | None:
     delay, samples = float(model.actuator_delay[number]), int(model.actuator_history[number, 0])
-    needed = delay / float(model.opt.timestep)
-    if samples < needed - ENOUGH:
+    # MuJoCo clips a delay to the length of the history silently: nsample · timestep ≥ delay.
+    required = delay / float(model.opt.timestep)
+    if samples < required - HISTORY_TOLERANCE:
         return (
             f"its nsample {samples} holds {samples * model.opt.timestep:g} s of its delay of "
-            f"{delay:g} s; expected nsample at least {int(np.ceil(needed - ENOUGH))}"
+            f"{delay:g} s; expected nsample at least {int(np.ceil(required - HISTORY_TOLERANCE))}"
         )
     dynamics = int(model.actuator_dyntype[number])
     if dynamics in FILTERS and model.actuator_actlimited[number]:
@@ -123,20 +142,26 @@ def _find_in_gain(model: mujoco.MjModel, number: int) -> str | None:
     gain = int(model.actuator_gaintype[number])
     if gain == DC_MOTOR:
         return _dc_motor(model, number)
-    speaks = model.actuator_gainprm[number, 1:3].any()
-    if gain == FIXED or (gain == AFFINE_GAIN and not speaks):
+    # Without its terms in length and velocity an affine gain is a fixed one.
+    depends_on_motion = model.actuator_gainprm[number, 1:3].any()
+    if gain == FIXED or (gain == AFFINE_GAIN and not depends_on_motion):
         return None
     name = mujoco.mjtGain(gain).name.removeprefix("mjGAIN_").lower()
-    how = "by position and speed" if gain == AFFINE_GAIN else "by a law of its own"
-    return f"its gaintype is {name}, force per command {how}; {EXPECTED}"
+    cause = "by position and speed" if gain == AFFINE_GAIN else "by a law of its own"
+    return f"its gaintype is {name}, force per command {cause}; {EXPECTED}"
 
 
 def _dc_motor(model: mujoco.MjModel, number: int) -> str:
-    """MuJoCo's DC motor at a constant voltage u, steady: force = gear · K/R · u − (gear · K)²/R ·
-    speed, where R is gainprm₀ and K is gainprm₁."""
+    """Return what to write in place of a DC motor.
+
+    In steady state at the voltage u, MuJoCo's DC motor exerts
+    force = gear · K/R · u − (gear · K)²/R · speed, with the resistance R = gainprm₀ and the motor
+    constant K = gainprm₁.
+    """
     resistance, constant = (float(value) for value in model.actuator_gainprm[number, :2])
     gear = float(model.actuator_gear[number, 0])
-    said = "it is a <dcmotor>, whose force falls with speed"
+    problem = "it is a <dcmotor>, whose force falls with speed"
+    # Inductance, cogging, thermal and current-limit parameters invalidate the steady-state law.
     plain = (
         resistance > 0.0
         and not model.actuator_gainprm[number, 2:].any()
@@ -144,9 +169,9 @@ def _dc_motor(model: mujoco.MjModel, number: int) -> str:
         and not model.actuator_dynprm[number].any()
     )
     if not plain:
-        return f"{said}; {EXPECTED}"
+        return f"{problem}; {EXPECTED}"
     return (
-        f'{said}; expected <motor gear="{gear * constant / resistance:.6g}"> with '
+        f'{problem}; expected <motor gear="{gear * constant / resistance:.6g}"> with '
         f"{(gear * constant) ** 2 / resistance:.6g} more damping at its joint (the back-EMF)"
     )
 
@@ -161,10 +186,12 @@ def _find_in_bias(model: mujoco.MjModel, number: int, kind: str) -> str | None:
     if bias[0] != 0.0:
         return f"its constant force is {bias[0]:g} (biasprm); expected 0"
     if kind == "servo":
-        said = f"its force by speed is {bias[2]:g} (biasprm); expected none, or against the speed"
-        return said if bias[2] > 0.0 else None
+        problem = f"its force by speed is {bias[2]:g} (biasprm); expected 0 or a negative number"
+        return problem if bias[2] > 0.0 else None
     if bias[1] != 0.0:
         return f'its force depends on position, {bias[1]:g} (biasprm); expected type = "servo"'
+    # The actuator's speed is gear · joint speed and its force acts through the gear again, hence
+    # gear² in the equivalent damping of the joint.
     gear = float(model.actuator_gear[number, 0])
     return (
         f"its force depends on speed, {bias[2]:g} (biasprm, as <velocity> has it); expected "

@@ -1,4 +1,4 @@
-"""The machines that descriptions are shipped for, and those of a user."""
+"""Machines by name: the shipped descriptions, and descriptions of a user by their path."""
 
 from __future__ import annotations
 
@@ -11,10 +11,11 @@ from rigtwin.description.machine import Machine
 from rigtwin.errors import RigtwinError
 
 SHIPPED = Path(str(files("machines")))
+"""Folder of the shipped descriptions."""
 
 
 def shipped() -> dict[str, Path]:
-    """Name → description."""
+    """Return the shipped descriptions as machine name → path."""
     return {path.stem.replace("_", "-"): path for path in sorted(SHIPPED.glob("*.toml"))}
 
 
@@ -24,14 +25,25 @@ def _load_once(path: Path) -> Machine:
 
 
 def find(name: str) -> Machine:
-    """A machine by its name, or by the path of its description. Raises RigtwinError with what there
-    is."""
+    """Return a machine.
+
+    Parameters
+    ----------
+    name
+        Name of a shipped machine, or path of a description.
+
+    Raises
+    ------
+    RigtwinError
+        If no such machine exists, or if its description has a mistake.
+    """
+    # Shipped descriptions do not change while Python runs; a user's may, and is read anew.
     if name in shipped():
         return _load_once(shipped()[name])
     path = Path(name)
     if path.suffix.lower() in (".xml", ".mjcf", ".urdf"):
         raise RigtwinError(
-            f"{name}: it is a model without a description; rigtwin describe {name} --log LOG "
+            f"{name}: a model without a description; rigtwin describe {name} --log LOG "
             "--out FOLDER writes one, and rigtwin diagnose LOG takes a model as it is"
         )
     if path.suffix == ".toml" or path.exists():
@@ -43,6 +55,8 @@ def find(name: str) -> Machine:
 
 
 def own_description(machine: Machine) -> Path | None:
-    """Return the path of a machine's description, or None if it is a shipped one, which every
-    installation has under its name."""
+    """Return the path of a user's description, or None for a shipped machine.
+
+    Every installation knows a shipped machine by its name.
+    """
     return None if shipped().get(machine.name) == machine.path else machine.path

@@ -1,7 +1,7 @@
 """Changes of a test's settings by name.
 
-`override` is the one way in from outside: TOML files, `--set`, recordings. Every key and value is
-checked.
+All values from outside (TOML files, `--set`, recordings) pass through `override`, which checks
+every key and value.
 """
 
 from __future__ import annotations
@@ -18,37 +18,38 @@ from rigtwin.files import parse_toml
 
 Applied = TypeVar("Applied")
 POSTERIOR = "posterior"
-"""The table of a calibrated twin's file beside its values; rigtwin.description.posterior reads
-it."""
+"""Table of a calibrated twin's file that states the uncertainty of its values, see
+`rigtwin.description.posterior`."""
 
 
 def check_value(key: str, value: object, meaning: Quantity | type[Choice]) -> float | Choice:
-    """The value of a setting, if it is allowed.
+    """Return the value of a setting, converted to its type.
 
     Parameters
     ----------
     key
-        Its name, for the message.
+        Name of the setting, for the message.
     value
-        A number, or a label.
+        Number, number as a text, or label of a choice.
     meaning
-        What is allowed.
+        Allowed values: a quantity with its bounds, or a choice with its labels.
 
     Returns
     -------
     float or Choice
-        The value.
+        Number in the quantity's unit, or member of the choice.
 
     Raises
     ------
     RigtwinError
-        Naming the key and what is allowed.
+        If the value is not allowed. The message names the key and the allowed values.
     """
     if not isinstance(meaning, Quantity):
         try:
             return meaning.parse(str(value))
         except ValueError as error:
             raise RigtwinError(f"{key}: {error}") from None
+    # bool is a subclass of int, but `true` is no number in TOML. NaN fails the comparison below.
     try:
         number = (
             float(value)
@@ -69,19 +70,19 @@ def check_value(key: str, value: object, meaning: Quantity | type[Choice]) -> fl
 def override(
     configuration: Configuration, changes: Mapping[str, Mapping[str, object]]
 ) -> Configuration:
-    """The configuration with changes.
+    """Return a configuration with changed settings.
 
     Parameters
     ----------
     configuration
-        To start from; it stays as it is.
+        Configuration to start from; it is not modified.
     changes
-        Group → name → value.
+        New values as group → name → value.
 
     Returns
     -------
     Configuration
-        With them.
+        Copy with the changes.
 
     Raises
     ------
@@ -115,25 +116,27 @@ def override(
 
 
 def read_toml(path: Path, apply: Callable[[Mapping[str, Any]], Applied]) -> Applied:
-    """What a function makes of a TOML file's tables.
+    """Apply a function to the tables of a TOML file.
 
     Parameters
     ----------
     path
-        Of the file.
+        Path of the TOML file.
     apply
-        The function.
+        Function of the parsed tables.
 
     Returns
     -------
     object
-        What it returns.
+        Result of the function.
 
     Raises
     ------
     RigtwinError
-        Naming file and fault.
+        If the file cannot be read, is not valid TOML, or is refused by the function. The message
+        names the file.
     """
+    # Editors on Windows write a byte order mark, which utf-8-sig removes.
     try:
         return apply(parse_toml(path.read_text(encoding="utf-8-sig")))
     except OSError as error:
@@ -145,8 +148,18 @@ def read_toml(path: Path, apply: Callable[[Mapping[str, Any]], Applied]) -> Appl
 
 
 def parse_assignments(assignments: Sequence[str]) -> Iterator[dict[str, dict[str, str]]]:
-    """group → name → value of each `group.name=value` text, as `--set` takes them. Raises
-    RigtwinError for any other."""
+    """Yield group → name → value for every assignment.
+
+    Parameters
+    ----------
+    assignments
+        Texts of the form `group.name=value`, as `--set` takes them.
+
+    Raises
+    ------
+    RigtwinError
+        For a text of another form.
+    """
     for text in assignments:
         key, equals, value = text.partition("=")
         group, dot, name = key.strip().partition(".")
@@ -156,53 +169,53 @@ def parse_assignments(assignments: Sequence[str]) -> Iterator[dict[str, dict[str
 
 
 def from_toml(configuration: Configuration, path: Path) -> Configuration:
-    """The configuration with a TOML file's settings.
+    """Return a configuration with the settings of a TOML file.
 
     Parameters
     ----------
     configuration
-        To start from; it stays as it is.
+        Configuration to start from; it is not modified.
     path
-        Of the file.
+        Path of the TOML file.
 
     Returns
     -------
     Configuration
-        With them.
+        Copy with the settings.
 
     Raises
     ------
     RigtwinError
-        Naming file and fault.
+        If the file cannot be read or a setting is not allowed. The message names the file.
     """
     return read_toml(path, lambda tables: override(configuration, values_of(tables)))
 
 
 def values_of(tables: Mapping[str, Any]) -> dict[str, Any]:
-    """A configuration file's tables without that of a calibrated twin which says how sure its
-    values are."""
+    """Return the tables that hold settings: all but `posterior`, the uncertainty of a calibrated
+    twin."""
     return {name: table for name, table in tables.items() if name != POSTERIOR}
 
 
 def from_assignments(configuration: Configuration, assignments: Sequence[str]) -> Configuration:
-    """The configuration with settings as `--set` takes them.
+    """Return a configuration with settings as `--set` takes them.
 
     Parameters
     ----------
     configuration
-        To start from; it stays as it is.
+        Configuration to start from; it is not modified.
     assignments
-        `group.name=value` each.
+        Texts of the form `group.name=value`. A later one replaces an earlier one.
 
     Returns
     -------
     Configuration
-        With them.
+        Copy with the settings.
 
     Raises
     ------
     RigtwinError
-        For any other text, key or value.
+        For a text of another form, or a key or value that is not allowed.
     """
     for changes in parse_assignments(assignments):
         configuration = override(configuration, changes)
@@ -216,48 +229,49 @@ Changes = Mapping[str, Mapping[str, object]] | str | Path
 def with_changes(
     configuration: Configuration, changes: Changes | Sequence[Changes]
 ) -> Configuration:
-    """The configuration with changes, or with several, one over the other.
+    """Return a configuration with changes of any form.
 
     Parameters
     ----------
     configuration
-        To start from; it stays as it is.
+        Configuration to start from; it is not modified.
     changes
-        Group → name → value, a TOML file, or several of them.
+        Group → name → value, path of a TOML file, or a sequence of these. In a sequence, a later
+        change replaces an earlier one.
 
     Returns
     -------
     Configuration
-        With them.
+        Copy with the changes.
 
     Raises
     ------
     RigtwinError
-        For any that is not allowed.
+        For a key or value that is not allowed, or a file that cannot be read.
     """
     if isinstance(changes, str | Path):
         return from_toml(configuration, Path(changes))
     if isinstance(changes, Mapping):
         return override(configuration, changes)
-    for each in changes:
-        configuration = with_changes(configuration, each)
+    for change in changes:
+        configuration = with_changes(configuration, change)
     return configuration
 
 
 def rebase(configuration: Configuration, base: Configuration) -> Configuration:
-    """What a configuration changes of the nominal suspension rig, on top of another base.
+    """Return a base with the settings in which a configuration differs from the nominal rig.
 
     Parameters
     ----------
     configuration
-        Of the suspension rig.
+        Configuration of the suspension rig.
     base
-        Of the same settings.
+        Configuration with the same settings, to which the differences are applied.
 
     Returns
     -------
     Configuration
-        The base with those changes.
+        Copy of the base with the differences.
     """
     changes: dict[str, dict[str, object]] = {}
     for (key, value, _), (_, nominal, _) in zip(

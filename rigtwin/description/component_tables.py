@@ -1,4 +1,4 @@
-"""The components of a description: what of the MJCF each is, its values, tolerances and effects."""
+"""The component tables of a description: element of the MJCF, values, tolerances and effects."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from rigtwin.components.quantity import Quantity, fields
 from rigtwin.components.sensors import MEASURES
 from rigtwin.description.machine import Component, ReplayOf
 from rigtwin.description.mechanism import Mechanism
-from rigtwin.description.mistakes import Mistakes, near
+from rigtwin.description.mistakes import Mistakes, suggest
 from rigtwin.description.physics import Physics, find_physics
 from rigtwin.description.tolerance import Tolerance
 from rigtwin.recording.schema import NAME as FIELD_NAME
@@ -39,19 +39,19 @@ TYPES: dict[str, type] = {
     "load cell": components.LoadCell,
     "gas spring": components.GasSpring,
 }
-"""Type of component as a description calls it."""
+"""Type of component, as a description writes it → class."""
 ELEMENTS = ("body", "joint", "tendon", "contact", "actuator", "sensor")
 """Elements of an MJCF that can be components."""
 SENSED = {name: MEASURES[of] for name, of in TYPES.items() if of in MEASURES}
 """Type of sensor → what it measures."""
 WHOLE = ("body", "base")
-"""Types that have no coordinate of their own."""
+"""Types that stand for a whole body and therefore have no coordinate."""
 PUSHING = ("force actuator", "servo")
-"""Types that push a joint; where it goes follows from that."""
+"""Types that exert a force on a joint, whose motion follows by forward dynamics."""
 MOVING = (*PUSHING, "position actuator", "motor", "cylinder")
 """Types that take a command."""
 UNITS = {"position": ("m", "rad"), "velocity": ("m/s", "rad/s"), "force": ("N", "Nm")}
-"""What is measured → its unit where the joint slides, and where it turns."""
+"""Measured quantity → its unit at a slide and at a hinge."""
 AT: dict[str, tuple[str, ...]] = {
     "mass": ("body",),
     "body": ("body",),
@@ -66,43 +66,90 @@ AT: dict[str, tuple[str, ...]] = {
     **dict.fromkeys((*PUSHING, "position actuator", "motor"), ("actuator",)),
     **dict.fromkeys(SENSED, ("sensor", "joint", "tendon")),
 }
-"""Type of component → elements of an MJCF that it can be."""
-TAKEN = ("computer", "mains", "controller", "safety", "timing")
-"""Names of other groups of settings."""
+"""Type of component → elements of an MJCF that it can stand for."""
+RESERVED = ("computer", "mains", "controller", "safety", "timing")
+"""Names of the other groups of settings, which no component may have."""
 COMPONENT_KEYS = (*ELEMENTS, "type", "channel", "command", "unit", "effects")
+"""Keys of a component's table that are no parameters."""
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+"""Pattern of a component's name, which becomes a field of a NamedTuple."""
 
 
 class Components:
-    """Components as they are read. found, types, values: name → component, type, NamedTuple of its
-    values; sources, told: of `component.parameter`, a text, and the controller's setting that says
-    it in recordings."""
+    """Components read so far.
+
+    Attributes
+    ----------
+    by_name
+        Component name → component.
+    types
+        Component name → type as the description writes it.
+    values
+        Component name → NamedTuple of its parameters.
+    tolerances
+        Declared tolerances of parameters.
+    sources
+        `component.parameter` → source of its value, a text.
+    parameter_settings
+        `component.parameter` → controller setting whose recorded value is the parameter's value.
+    """
 
     def __init__(self, mechanism: Mechanism, mistakes: Mistakes) -> None:
+        """Start without components. mistakes: list to which mistakes are added."""
         self._mechanism, self.mistakes = mechanism, mistakes
-        self.found: dict[str, Component] = {}
+        self.by_name: dict[str, Component] = {}
         self.types: dict[str, str] = {}
         self.values: dict[str, Any] = {}
         self.tolerances: list[Tolerance] = []
         self.sources: dict[str, str] = {}
-        self.told: dict[str, str] = {}
+        self.parameter_settings: dict[str, str] = {}
 
     def physics(self, replays: Sequence[ReplayOf] = ()) -> Physics:
         """Return the physics of the machine that the components make up."""
         return find_physics({name: type(value) for name, value in self.values.items()}, replays)
 
     def add(self, name: str, table: object) -> None:
-        """Reads one component's table."""
-        mechanism = self._mechanism
+        """Read the table of one component; note its mistakes and add it if it has an element and a
+        type."""
         where = f"[components.{name}]"
         if not isinstance(table, Mapping):
             self.mistakes.note(where, "expected a table")
             return
-        if not NAME.fullmatch(name) or name in TAKEN:
+        if not NAME.fullmatch(name) or name in RESERVED:
             self.mistakes.note(
                 where, f"{name!r} cannot be a component's name; expected letters, digits and _"
             )
             return
+        reference = self._find_element(where, table)
+        if reference is None:
+            return
+        element, mjcf = reference
+        kind = self._type(where, table, element, mjcf)
+        if kind is None:
+            return
+        mechanism = self._mechanism
+        joint = mechanism.joint_of(element, mjcf)
+        self.types[name] = kind
+        self.values[name] = self._fill(
+            name=name, where=where, kind=kind, table=table, element=element, mjcf=mjcf, joint=joint
+        )
+        acts_on = () if kind in WHOLE else mechanism.acts_on(element, mjcf)
+        turns = bool(acts_on) and all(mechanism.turns(hinge) for hinge, _ in acts_on)
+        channel, unit = self._find_channel(name, where, kind, table, turns)
+        self.by_name[name] = Component(
+            name=name,
+            element=element,
+            mjcf=mjcf,
+            joint=joint,
+            channel=channel,
+            unit=unit,
+            kinds=self._kinds(where, kind, table),
+            acts_on=acts_on,
+            turns=turns,
+        )
+
+    def _find_element(self, where: str, table: Mapping[str, Any]) -> tuple[str, str] | None:
+        """Return kind and name of the MJCF element that a table refers to; note its absence."""
         elements = [key for key in ELEMENTS if key in table]
         if len(elements) != 1:
             self.mistakes.note(
@@ -110,23 +157,18 @@ class Components:
                 f"expected one of {', '.join(ELEMENTS)} to say what "
                 f"of the MJCF it is, found {len(elements)}",
             )
-            return
+            return None
         element, mjcf = elements[0], str(table[elements[0]])
-        if mjcf not in mechanism.names(element):
-            self.mistakes.note(
-                where, f"the MJCF has no {element} {mjcf!r}; {near(mjcf, mechanism.names(element))}"
-            )
-            return
-        kind = self._type(where, table, element, mjcf)
-        if kind is None:
-            return
-        joint = mechanism.joint_of(element, mjcf)
-        self.types[name] = kind
-        self.values[name] = self._fill(
-            name=name, where=where, kind=kind, table=table, element=element, mjcf=mjcf, joint=joint
-        )
-        acts_on = () if kind in WHOLE else mechanism.acts_on(element, mjcf)
-        turns = bool(acts_on) and all(mechanism.turns(each) for each, _ in acts_on)
+        names = self._mechanism.names(element)
+        if mjcf not in names:
+            self.mistakes.note(where, f"the MJCF has no {element} {mjcf!r}; {suggest(mjcf, names)}")
+            return None
+        return element, mjcf
+
+    def _find_channel(
+        self, name: str, where: str, kind: str, table: Mapping[str, Any], turns: bool
+    ) -> tuple[tuple[str, str] | None, str]:
+        """Return the recorded channel of a component, None without one, and the channel's unit."""
         unit = str(table.get("unit", ""))
         for key in ("channel", "command", "unit"):
             if key in table and not isinstance(table[key], str):
@@ -141,6 +183,7 @@ class Components:
             unit = UNITS[SENSED[kind]][turns]
             channel = ("/sensor", str(table.get("channel", name)))
             if table.get("unit", unit) != unit:
+                # A description that converted units would hide a wrong unit of the recording.
                 self.mistakes.note(
                     where,
                     f"unit {table['unit']!r}: recordings are in SI, "
@@ -157,29 +200,21 @@ class Components:
                     f"{key} is for {'sensors' if key == 'channel' else 'actuators'}; "
                     f"this is a {kind}",
                 )
-        for other, known in self.found.items():
+        for earlier, known in self.by_name.items():
             if channel is not None and known.channel == channel and kind in SENSED:
                 self.mistakes.note(
                     where,
-                    f"its channel {channel[1]!r} is that of {other}; expected one for each sensor",
+                    f"its channel {channel[1]!r} is that of {earlier}; "
+                    "expected one for each sensor",
                 )
-        self.found[name] = Component(
-            name=name,
-            element=element,
-            mjcf=mjcf,
-            joint=joint,
-            channel=channel,
-            unit=unit,
-            kinds=self._kinds(where, kind, table),
-            acts_on=acts_on,
-            turns=turns,
-        )
+        return channel, unit
 
     def _type(self, where: str, table: Mapping[str, Any], element: str, mjcf: str) -> str | None:
+        """Return the type of a component: the declared one, or the one that its element implies."""
         if "type" in table:
             if table["type"] not in TYPES:
                 self.mistakes.note(
-                    where, f"unknown type {table['type']!r}; {near(table['type'], TYPES)}"
+                    where, f"unknown type {table['type']!r}; {suggest(table['type'], TYPES)}"
                 )
                 return None
             return self._fitting(where, str(table["type"]), element, mjcf)
@@ -195,7 +230,7 @@ class Components:
         return None
 
     def _fitting(self, where: str, kind: str, element: str, mjcf: str) -> str | None:
-        """The type, if its element of the MJCF can be one."""
+        """Return the declared type, or None if its MJCF element cannot have that type."""
         if element not in AT[kind]:
             fits = [each for each, at in AT.items() if element in at]
             self.mistakes.note(
@@ -215,9 +250,10 @@ class Components:
         return kind
 
     def _kinds(self, where: str, kind: str, table: Mapping[str, Any]) -> frozenset[str] | None:
+        """Return the kinds of effects that a component may have; None for all of its type."""
         if "effects" not in table:
             return None
-        possible = sorted({each.name for each in KINDS if TYPES[kind] in each.at})
+        possible = sorted({known.name for known in KINDS if TYPES[kind] in known.at})
         wanted = table["effects"]
         if not isinstance(wanted, list) or not all(isinstance(each, str) for each in wanted):
             self.mistakes.note(
@@ -225,10 +261,10 @@ class Components:
                 'effects: expected a list of kinds, such as ["gain", "offset"], or [] for none',
             )
             return None
-        for each in wanted:
-            if each not in possible:
+        for name in wanted:
+            if name not in possible:
                 self.mistakes.note(
-                    where, f"effects: a {kind} has no {each!r}; {near(each, possible)}"
+                    where, f"effects: a {kind} has no {name!r}; {suggest(name, possible)}"
                 )
         return frozenset(wanted)
 
@@ -242,58 +278,31 @@ class Components:
         mjcf: str,
         joint: str,
     ) -> Any:
-        """The component's values: those of its type, then of the MJCF, then of the description."""
-        component = TYPES[kind]()
+        """Return the values of a component.
+
+        Values of the description replace those of the MJCF, which replace the type's defaults.
+        """
+        component = self._read_mjcf(where, kind, element, mjcf, joint)
+        if component is None:
+            return TYPES[kind]()
         meanings = {
             key: meaning
             for key, meaning in fields(TYPES[kind]).items()
             if isinstance(meaning, Quantity)
         }
-        if kind == "mass" and joint:
-            moving = self._mechanism.joint(joint)
-            component = component._replace(mass=moving.inertia - moving.armature)
-        elif kind == "body" and element == "body":
-            component = component._replace(**self._mechanism.body(mjcf))
-        elif kind == "guide" and (element == "tendon" or joint):
-            component = component._replace(**self._mechanism.friction(element, mjcf))
-        elif kind == "rotor" and (element == "tendon" or joint):
-            component = component._replace(inertia=self._mechanism.armature(element, mjcf))
-        if kind in (*PUSHING, "position actuator"):
-            obstacle = self._mechanism.actuator_obstacle(mjcf, kind)
-            if obstacle is not None:
-                self.mistakes.note(where, f"actuator {mjcf!r}: {obstacle}")
-                return component
-            component = component._replace(**self._mechanism.actuator_timing(mjcf))
-        if kind == "position actuator":
-            component = component._replace(**self._mechanism.rest_position(mjcf))
-        elif kind == "force actuator":
-            constant, limit = self._mechanism.force_per_command(mjcf)
-            if not constant > 0.0:
-                self.mistakes.note(
-                    where,
-                    f"actuator {mjcf!r} has gear times gain {constant:g}; expected more than 0",
-                )
-                return component
-            component = component._replace(constant=constant, force_limit=min(limit, UNLIMITED))
-        elif kind == "servo":
-            component = component._replace(**self._servo(where, mjcf))
-        if kind in (*PUSHING, "position actuator"):
-            low, high = self._mechanism.command_limits(mjcf)
-            component = component._replace(
-                command_low=max(low, -UNLIMITED), command_high=min(high, UNLIMITED)
-            )
-        for key, given in table.items():
+        for key, entry in table.items():
             if key in COMPONENT_KEYS:
                 continue
             if key not in meanings:
+                # Only the component's element is offered: the other elements would not fit.
                 known = [
-                    each
-                    for each in (*meanings, *COMPONENT_KEYS)
-                    if each not in ELEMENTS or each == element
+                    candidate
+                    for candidate in (*meanings, *COMPONENT_KEYS)
+                    if candidate not in ELEMENTS or candidate == element
                 ]
-                self.mistakes.note(where, f"unknown key {key!r}; {near(key, known)}")
+                self.mistakes.note(where, f"unknown key {key!r}; {suggest(key, known)}")
                 continue
-            component = self._value(name, where, component, key, given, meanings[key])
+            component = self._value(name, where, component, key, entry, meanings[key])
         for key, meaning in meanings.items():
             value = getattr(component, key)
             if key not in table and not meaning.low <= value <= meaning.high:
@@ -310,31 +319,77 @@ class Components:
                 )
         return component
 
+    def _read_mjcf(self, where: str, kind: str, element: str, mjcf: str, joint: str) -> Any:
+        """Return a component with the values that the MJCF states, and defaults for the rest.
+
+        The result is None where the component cannot express its actuator, which is noted.
+        """
+        component = TYPES[kind]()
+        if kind == "mass" and joint:
+            # M(q) holds the armature too, which turns with the motor and has no weight.
+            moving = self._mechanism.joint(joint)
+            component = component._replace(mass=moving.inertia - moving.armature)
+        elif kind == "body" and element == "body":
+            component = component._replace(**self._mechanism.body(mjcf))
+        elif kind == "guide" and (element == "tendon" or joint):
+            component = component._replace(**self._mechanism.friction(element, mjcf))
+        elif kind == "rotor" and (element == "tendon" or joint):
+            component = component._replace(inertia=self._mechanism.armature(element, mjcf))
+        if kind in (*PUSHING, "position actuator"):
+            obstacle = self._mechanism.actuator_obstacle(mjcf, kind)
+            if obstacle is not None:
+                self.mistakes.note(where, f"actuator {mjcf!r}: {obstacle}")
+                return None
+            component = component._replace(**self._mechanism.actuator_timing(mjcf))
+        if kind == "position actuator":
+            component = component._replace(**self._mechanism.rest_position(mjcf))
+        elif kind == "force actuator":
+            constant, limit = self._mechanism.force_per_command(mjcf)
+            if not constant > 0.0:
+                self.mistakes.note(
+                    where,
+                    f"actuator {mjcf!r} has gear times gain {constant:g}; expected more than 0",
+                )
+                return None
+            component = component._replace(constant=constant, force_limit=min(limit, UNLIMITED))
+        elif kind == "servo":
+            component = component._replace(**self._servo(where, mjcf))
+        if kind in (*PUSHING, "position actuator"):
+            # Bounds of a Quantity are finite, so that no limit is the number UNLIMITED.
+            low, high = self._mechanism.command_limits(mjcf)
+            component = component._replace(
+                command_low=max(low, -UNLIMITED), command_high=min(high, UNLIMITED)
+            )
+        return component
+
     def _servo(self, where: str, mjcf: str) -> dict[str, float]:
-        """Values of the MJCF's servo."""
-        found = self._mechanism.servo(mjcf)
-        if found is None:
+        """Return the parameters of a servo that the MJCF states; note an actuator that is none."""
+        parameters = self._mechanism.servo(mjcf)
+        if parameters is None:
             self.mistakes.note(
                 where,
                 f"actuator {mjcf!r} is no servo; expected a position actuator of MuJoCo's, with "
                 "gear 1",
             )
             return {}
-        return found
+        return parameters
 
     def _value(
-        self, name: str, where: str, component: Any, key: str, given: object, meaning: Quantity
+        self, name: str, where: str, component: Any, key: str, entry: object, meaning: Quantity
     ) -> Any:
-        """One parameter: a number, or a table of value, tolerance and source."""
-        here = f"{where} {key}"
-        table: Mapping[str, Any] = given if isinstance(given, Mapping) else {"value": given}
-        self.mistakes.unknown(here, table, ("value", "tolerance", "source", "setting"))
+        """Return the component with one parameter as the description states it.
+
+        The entry is a number, or a table with value, tolerance, source and setting.
+        """
+        place = f"{where} {key}"
+        table: Mapping[str, Any] = entry if isinstance(entry, Mapping) else {"value": entry}
+        self.mistakes.unknown(place, table, ("value", "tolerance", "source", "setting"))
         if "value" in table:
             component = component._replace(
-                **{key: self.mistakes.number(here, table["value"], meaning.low, meaning.high)}
+                **{key: self.mistakes.number(place, table["value"], meaning.low, meaning.high)}
             )
         if "setting" in table:
-            self.told[f"{name}.{key}"] = str(table["setting"])
+            self.parameter_settings[f"{name}.{key}"] = str(table["setting"])
         if "source" in table:
             self.sources[f"{name}.{key}"] = str(table["source"])
         if "tolerance" in table:
@@ -350,7 +405,7 @@ class Components:
                 self.tolerances.append(Tolerance(name, key, float(width)))
             else:
                 self.mistakes.note(
-                    here,
+                    place,
                     f"tolerance {width!r}: expected a number in "
                     f'{meaning.unit} or a percentage such as "1 %"',
                 )
@@ -358,6 +413,6 @@ class Components:
 
 
 def share_of(text: str) -> float | None:
-    """A percentage as a share."""
+    """Return a percentage such as "1.5 %" as a share; None for any other text."""
     match = re.fullmatch(r"\s*([0-9.]+(?:e-?\d+)?)\s*%\s*", text)
     return float(match.group(1)) / 100.0 if match else None

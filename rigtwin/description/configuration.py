@@ -1,6 +1,6 @@
 """All settings of one test of one machine.
 
-One type for every machine. What a machine does not have (a road, say) is a group without settings.
+Every machine uses the same type. A group that a machine lacks, such as the road, has no settings.
 """
 
 from __future__ import annotations
@@ -18,14 +18,26 @@ from rigtwin.errors import RigtwinError
 P = TypeVar("P", bound=Plant)
 C = TypeVar("C", bound=tuple)
 MOST_TICKS = 100_000_000
-"""More than a day at 1 kHz."""
+"""Largest number of ticks in a test: more than a day at 1 kHz."""
 
 
 class Configuration(NamedTuple, Generic[P, C]):
-    """All settings of one test of one machine; by default of the nominal suspension rig.
+    """All settings of one test of one machine. The defaults are those of the nominal rig.
 
-    Keys are `group.name`, e.g. `rail.coulomb`, `controller.kp`, `timing.duration`. plant and
-    controller are NamedTuples, of whatever components and settings the machine has.
+    A setting's key is `group.name`, such as `rail.coulomb`, `controller.kp`, `timing.duration`.
+
+    Attributes
+    ----------
+    plant
+        NamedTuple of the machine's components.
+    controller
+        NamedTuple of the controller's settings.
+    safety
+        Limits that end a test.
+    timing
+        Duration, control period and integration step.
+    road
+        Spectrum of the pseudo-random road.
     """
 
     plant: P = RigPlant()  # type: ignore[assignment]
@@ -36,8 +48,9 @@ class Configuration(NamedTuple, Generic[P, C]):
 
     @property
     def substeps(self) -> int:
-        """Integration steps a tick. Raises RigtwinError unless the period is a whole multiple of
+        """Integration steps per tick. Raises RigtwinError unless the period is a whole multiple of
         the timestep."""
+        # Decimal periods are no exact multiples in binary, hence the tolerance of 1e-6.
         ratio = self.timing.period / self.timing.timestep
         if ratio < 0.999 or abs(ratio - round(ratio)) > 1e-6:
             raise RigtwinError(
@@ -48,7 +61,8 @@ class Configuration(NamedTuple, Generic[P, C]):
 
     @property
     def ticks(self) -> int:
-        """Ticks in the test, at least one. Raises RigtwinError for more than fit into memory."""
+        """Number of ticks of the test, at least one. Raises RigtwinError above `MOST_TICKS`, which
+        would not fit into memory."""
         ticks = max(1, round(self.timing.duration / self.timing.period))
         if ticks > MOST_TICKS:
             raise RigtwinError(
@@ -58,17 +72,18 @@ class Configuration(NamedTuple, Generic[P, C]):
 
 
 def groups(configuration: Configuration) -> dict[str, Any]:
-    """The groups of settings.
+    """Return the groups of settings.
 
     Parameters
     ----------
     configuration
-        Of any machine.
+        Configuration of any machine.
 
     Returns
     -------
     dict
-        Name → NamedTuple: the plant's components side by side with the rest; none that is empty.
+        Group name → NamedTuple. The plant's components stand beside the other groups; groups
+        without settings are omitted.
     """
     rest = {
         name: value
@@ -79,12 +94,12 @@ def groups(configuration: Configuration) -> dict[str, Any]:
 
 
 def flatten(configuration: Configuration) -> dict[str, dict[str, float | str]]:
-    """The settings as TOML and recordings hold them.
+    """Return the settings as TOML files and recordings store them.
 
     Parameters
     ----------
     configuration
-        Of any machine.
+        Configuration of any machine.
 
     Returns
     -------
@@ -101,7 +116,7 @@ def flatten(configuration: Configuration) -> dict[str, dict[str, float | str]]:
 
 
 def parameters(configuration: Configuration) -> Iterator[tuple[str, Any, Quantity | type[Choice]]]:
-    """(key, value, what it means) of every setting."""
+    """Yield key, value and allowed values of every setting."""
     for name, group in groups(configuration).items():
         for key, meaning in fields(type(group)).items():
             yield f"{name}.{key}", getattr(group, key), meaning

@@ -1,7 +1,8 @@
 """The controller of a machine: a formula of its description, or the Python controller of the
 suspension rig.
 
-A diagnosis replays it: recorded inputs in, commands out, to be compared with those recorded.
+A diagnosis replays a controller: it recomputes the commands from the recorded inputs and compares
+them with the recorded commands.
 """
 
 from __future__ import annotations
@@ -34,49 +35,49 @@ from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
 
 Channel = tuple[str, str]
-"""Topic and field of a recording."""
+"""Topic and field of a recorded signal."""
 
 
 class Control(Protocol):
-    """A controller whose commands can be worked out again from what was recorded."""
+    """Controller whose commands can be recomputed from a recording."""
 
     @property
     def settings(self) -> Any:
-        """Its settings as described: a NamedTuple."""
+        """Settings as described, a NamedTuple."""
         ...
 
     @property
     def text(self) -> str:
-        """What it is, in a line."""
+        """Summary of the controller in one line."""
         ...
 
     @property
     def channels(self) -> tuple[Channel, ...]:
-        """What it reads, in order."""
+        """Channels that the controller reads, in the order of the inputs of `replay`."""
         ...
 
     @property
     def outputs(self) -> tuple[str, ...]:
-        """The commands that it computes."""
+        """Names of the commands that the controller computes."""
         ...
 
     @property
     def exact(self) -> float | None:
-        """rms in the command's unit within which its replay counts as exact; None for the
-        recording's rounding."""
+        """Largest rms deviation of a replay that counts as exact, in the command's unit. None
+        stands for the rounding of the recording."""
         ...
 
     def replay(self, settings: Any, inputs: Sequence[Array], period: float) -> Array:
-        """Its commands for recorded inputs.
+        """Return the commands for recorded inputs.
 
         Parameters
         ----------
         settings
-            As in `settings`, maybe with other values.
+            Settings to replay with: the type of `settings`, with any allowed values.
         inputs
-            One signal a channel, shape (ticks,) each.
+            Recorded signal of every channel, shape (ticks,).
         period
-            s, of a tick.
+            Period of a tick, s.
 
         Returns
         -------
@@ -87,7 +88,19 @@ class Control(Protocol):
 
 @dataclass(frozen=True)
 class FormulaControl:
-    """A formula that computes one command. inputs: name in the formula → channel."""
+    """Controller given by a formula that computes one command.
+
+    Attributes
+    ----------
+    output
+        Name of the command.
+    formula
+        Compiled formula.
+    inputs
+        Name in the formula → channel that it reads.
+    exact
+        Largest rms deviation of a replay that counts as exact, in the command's unit.
+    """
 
     output: str
     formula: Formula
@@ -96,42 +109,51 @@ class FormulaControl:
 
     @cached_property
     def settings(self) -> Any:
+        """Settings of the formula with their described values, a NamedTuple."""
         values = self.formula.settings
         return settings_of(values, "the description") if values else Nothing()
 
     @property
     def text(self) -> str:
+        """Command and formula, as the description writes them."""
         return f"{self.output} = {self.formula.text}"
 
     @property
     def channels(self) -> tuple[Channel, ...]:
+        """Channels that the formula reads, in the order of its inputs."""
         return tuple(self.inputs[name] for name in self.formula.inputs)
 
     @property
     def outputs(self) -> tuple[str, ...]:
+        """Name of the one command."""
         return (self.output,)
 
     def program(self, settings: Mapping[str, float]) -> Program:
-        """The formula as it runs with some values of its settings.
+        """Return the program that runs the formula with other values of its settings.
 
         Parameters
         ----------
         settings
-            Name → value.
+            Setting → value. Settings that are not named have the described value.
 
         Raises
         ------
         RigtwinError
-            If a block cannot work with them, such as a low-pass filter with a negative time.
+            If a block refuses a value, such as a low-pass filter with a negative time constant.
         """
+        # Compiling the text again checks the arguments of the blocks, such as a filter's time
+        # constant; `with_settings` alone replaces values without a check.
         try:
-            own = self.formula.settings
-            formula(self.formula.text, {name: settings.get(name, own[name]) for name in own})
+            described = self.formula.settings
+            formula(
+                self.formula.text, {name: settings.get(name, described[name]) for name in described}
+            )
         except ValueError as error:
             raise RigtwinError(f"controller of {self.output}: {error}") from None
         return self.formula.with_settings(settings)
 
     def replay(self, settings: Any, inputs: Sequence[Array], period: float) -> Array:
+        """Return the command for recorded inputs, shape (1, ticks); see `Control.replay`."""
         return self.formula.replayed(settings._asdict(), inputs, period)[None]
 
 
@@ -144,6 +166,11 @@ def _replay(
     demands: Array,
     out: Array,
 ) -> None:
+    """Run the rig's controller over recorded ticks.
+
+    sensors: shape (ticks, 4); demands: shape (ticks, 3); out: receives the commands, (ticks, 4).
+    """
+    # A kernel takes arrays only, so the state arrives packed: its size must be a constant.
     state = unpacked(to_fixed_tuple(start, SIZE), plate)  # type: ignore[call-arg]
     for tick in range(len(sensors)):
         measured = Measurements(
@@ -156,14 +183,14 @@ def _replay(
 
 
 def set_up(settings: Settings, period: float) -> Controller:
-    """The rig's controller at some settings.
+    """Return the suspension rig's controller.
 
     Parameters
     ----------
     settings
-        Of it.
+        Settings of the controller.
     period
-        s, of a tick.
+        Period of a tick, s.
 
     Raises
     ------
@@ -178,29 +205,41 @@ def set_up(settings: Settings, period: float) -> Controller:
 
 @dataclass(frozen=True)
 class RigControl:
-    """The controller of the suspension rig, `controllers.update`. What was demanded of it stands
-    among its commands."""
+    """Controller of the suspension rig, `controllers.update`.
+
+    Recordings store its demands in the topic of the commands.
+
+    Attributes
+    ----------
+    exact
+        Largest rms deviation of a replay that counts as exact; None for the recording's rounding.
+    """
 
     exact: float | None = None
 
     @property
     def settings(self) -> Settings:
+        """Nominal settings."""
         return Settings()
 
     @property
     def text(self) -> str:
+        """Module that implements the controller."""
         return "controllers.mil, in Python"
 
     @property
     def channels(self) -> tuple[Channel, ...]:
+        """Channels of the four sensors, then of the three demands."""
         sensors = (("/sensor", name) for name in Measurements._fields)
         return (*sensors, *(("/command", name) for name in Demand._fields))
 
     @property
     def outputs(self) -> tuple[str, ...]:
+        """Names of the four commands."""
         return Commands._fields
 
     def replay(self, settings: Settings, inputs: Sequence[Array], period: float) -> Array:
+        """Return the commands for recorded inputs, shape (4, ticks); see `Control.replay`."""
         controlling = set_up(settings, period)
         table = np.ascontiguousarray(np.column_stack(inputs), np.float64)
         sensors, demands = np.hsplit(table, [len(Measurements._fields)])
@@ -218,4 +257,4 @@ class RigControl:
 
 
 PYTHON: dict[str, Control] = {"controllers.mil": RigControl()}
-"""Controllers written in Python, by the name that a description gives them."""
+"""Name in a description → controller written in Python."""

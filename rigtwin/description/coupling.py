@@ -10,10 +10,10 @@ import numpy as np
 from rigtwin.description.mechanism import Mechanism
 
 POSES, SHARE = 7, 1e-6
-"""Poses that are tried, and the share of the diagonal terms below which a coupling term is zero."""
+"""Number of poses, and the share of the diagonal terms below which a coupling term is zero."""
 
 
-def act_on_each_other(mechanism: Mechanism, joints: Sequence[str]) -> bool:
+def are_coupled(mechanism: Mechanism, joints: Sequence[str]) -> bool:
     """Return whether any two of the joints act on each other.
 
     The mass matrix M(q) is evaluated at several poses within the ranges of the joints. Joints i and
@@ -32,6 +32,8 @@ def act_on_each_other(mechanism: Mechanism, joints: Sequence[str]) -> bool:
         return False
     if model.ntendon or any(tie.joint in joints and tie.to in joints for tie in mechanism.ties()):
         return True
+    # A coupling term can vanish at one pose by symmetry (a stretched arm), hence several random
+    # ones. The seed is fixed, so that a description always gives the same structure.
     numbers = [mechanism.number("joint", joint) for joint in joints]
     at = [int(model.jnt_dofadr[number]) for number in numbers]
     data, random = mujoco.MjData(model), np.random.default_rng(0)
@@ -40,6 +42,7 @@ def act_on_each_other(mechanism: Mechanism, joints: Sequence[str]) -> bool:
     for _ in range(POSES):
         _pose(model, data, numbers, random)
         mujoco.mj_fullM(model, data, full)
+        # |M_ij| ≤ √(M_ii·M_jj) in a positive definite matrix, so the ratio lies between 0 and 1.
         scale = np.sqrt(np.outer(np.diag(full)[at], np.diag(full)[at]))
         off = np.abs(full[np.ix_(at, at)]) / np.maximum(scale, 1e-300)
         np.fill_diagonal(off, 0.0)
@@ -51,8 +54,9 @@ def act_on_each_other(mechanism: Mechanism, joints: Sequence[str]) -> bool:
 def _pose(
     model: mujoco.MjModel, data: mujoco.MjData, numbers: Sequence[int], random: np.random.Generator
 ) -> None:
-    """Put the joints at random positions, at rest."""
+    """Put the joints at random positions, at rest, so that qfrc_bias is the gravity load alone."""
     for number in numbers:
+        # Without a range, 1 m or 1 rad to either side is tried.
         low, high = model.jnt_range[number] if model.jnt_limited[number] else (-1.0, 1.0)
         data.qpos[model.jnt_qposadr[number]] = random.uniform(low, high)
     data.qvel[:] = 0.0
@@ -60,7 +64,7 @@ def _pose(
 
 
 def _weights(mechanism: Mechanism, at: Sequence[int]) -> float:
-    """Largest gravity load that the machine could have, as a scale, N or Nm."""
+    """Return a scale of the gravity load, N or Nm: the weight of all bodies at a lever of 1 m."""
     model = mechanism.model
     return float(np.sum(model.body_mass) * np.linalg.norm(model.opt.gravity)) * len(at)
 
@@ -72,16 +76,17 @@ def _load_moves(
     at: Sequence[int],
     weights: float,
 ) -> bool:
-    """Whether the gravity load of one joint changes with the position of another."""
+    """Return whether the gravity load of one joint changes with the position of another one."""
     before = data.qfrc_bias[list(at)].copy()
-    for own, number in enumerate(numbers):
+    for index, number in enumerate(numbers):
         place = int(model.jnt_qposadr[number])
-        was = float(data.qpos[place])
-        data.qpos[place] = was + 0.1
+        original = float(data.qpos[place])
+        data.qpos[place] = original + 0.1
         mujoco.mj_forward(model, data)
         change = np.abs(data.qfrc_bias[list(at)] - before)
-        change[own] = 0.0
-        data.qpos[place] = was
+        # A joint's gravity load may depend on its own position without any coupling.
+        change[index] = 0.0
+        data.qpos[place] = original
         if change.max() > SHARE * max(weights, 1e-300):
             return True
     mujoco.mj_forward(model, data)

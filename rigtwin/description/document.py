@@ -1,5 +1,4 @@
-"""Reads a machine's description, one TOML beside an MJCF, and explains every mistake in it in one
-line."""
+"""Reader of a machine's description, a TOML file beside an MJCF. Every mistake becomes one line."""
 
 from __future__ import annotations
 
@@ -17,17 +16,18 @@ from rigtwin.description.implied import expand
 from rigtwin.description.limits import read_limits
 from rigtwin.description.machine import Machine
 from rigtwin.description.mechanism import Mechanism
-from rigtwin.description.mistakes import Mistakes, near
+from rigtwin.description.mistakes import Mistakes, suggest
 from rigtwin.description.prior import PRIORS
 from rigtwin.description.replay_tables import Replays
 from rigtwin.errors import RigtwinError
 from rigtwin.files import parse_toml
 
 TABLES = ("machine", "components", "controller", "replays", "mains", "experiments", "limits")
+"""Tables of a description."""
 
 
 def load(path: Path) -> Machine:
-    """The machine of a description. Raises RigtwinError with the first mistake in it."""
+    """Return the machine of a description. Raises RigtwinError with the first mistake in it."""
     machine, mistakes = examine(path)
     if mistakes or machine is None:
         more = (
@@ -40,8 +40,18 @@ def load(path: Path) -> Machine:
 
 
 def examine(path: Path) -> tuple[Machine | None, list[str]]:
-    """The machine of a description, and all mistakes in it, one line each; no machine if there are
-    any."""
+    """Return the machine of a description, and all mistakes in it, one line per mistake.
+
+    Parameters
+    ----------
+    path
+        Path of the TOML file.
+
+    Returns
+    -------
+    tuple
+        Machine, or None if there are mistakes; and the mistakes.
+    """
     try:
         text = path.read_text(encoding="utf-8-sig")
     except OSError as error:
@@ -52,14 +62,14 @@ def examine(path: Path) -> tuple[Machine | None, list[str]]:
 
 
 def examine_text(text: str, path: Path) -> tuple[Machine | None, list[str]]:
-    """Return the machine of a description in memory, and all mistakes in it, one line each.
+    """Return the machine of a description in memory, and all mistakes in it, one line per mistake.
 
     Parameters
     ----------
     text
-        The description, TOML.
+        Description, TOML.
     path
-        File that the description would be. Its model is looked for beside that file.
+        Path at which the description would be saved. Its model is searched for in that folder.
     """
     mistakes = Mistakes()
     try:
@@ -72,14 +82,69 @@ def examine_text(text: str, path: Path) -> tuple[Machine | None, list[str]]:
 
 
 class _Reader:
+    """Reader of one parsed description. Reading goes on after a mistake, so that all are noted."""
+
     def __init__(self, path: Path, document: Mapping[str, Any], mistakes: Mistakes) -> None:
         self._path, self._document, self._mistakes = path, document, mistakes
 
     def machine(self) -> Machine | None:
+        """Return the machine, or None if the description has mistakes."""
+        note = self._mistakes.note
+        about = self._machine_table()
+        mechanism = self._mechanism(about)
+        # Implied components need the mechanism: their joints and sensors are elements of the MJCF.
+        if mechanism is not None:
+            self._document = expand(self._document, mechanism, self._mistakes)
+        tables = self._component_tables()
+        if mechanism is None:
+            return None
+        # The order follows the references: replays name components, and the physics depends on
+        # both.
+        components = Components(mechanism, self._mistakes)
+        for name, table in tables.items():
+            components.add(name, table)
+        control = self._control(components)
+        reader = Replays(mechanism, components, control, self._mistakes)
+        replays = reader.read(self._document.get("replays", []))
+        physics = reader.physics(replays)
+        hum = self._table("mains", ("frequency",)).get("frequency", 50.0)
+        mains = self._mistakes.number("[mains] frequency", hum, 1.0, 400.0)
+        experiments = self._experiments()
+        limits = read_limits(self._document.get("limits", {}), components.by_name, self._mistakes)
+        if self._document.get("limits") and not physics.declares_limits:
+            note("[limits]", f"{physics.title} has its own, the settings of safety")
+        if self._mistakes:
+            return None
+        # Timing tolerances of the description have priority, so these come last.
+        reader.tolerate_timing(replays)
+        values = {**components.values, "computer": Computer(), "mains": Mains(mains)}
+        return Machine(
+            name=str(about["name"]),
+            title=str(about.get("title", about["name"])),
+            path=self._path,
+            model=self._model_path(about),
+            plant=physics.assemble(values),
+            kind=physics.name,
+            components=components.by_name,
+            tolerances=tuple(components.tolerances),
+            replays=replays,
+            control=control,
+            prior=PRIORS[about.get("nominal", "rough")],
+            form=float(about["form"]) if "form" in about else None,
+            sources=components.sources,
+            parameter_settings=components.parameter_settings,
+            experiments=experiments,
+            limits=limits,
+            next_tests=self._next_tests(),
+            overlooked=physics.list_overlooked(mechanism, components.by_name, replays),
+        )
+
+    def _machine_table(self) -> Mapping[str, Any]:
+        """Return the table [machine]; note unknown tables and wrong values in it."""
         note = self._mistakes.note
         for key in self._document:
             if key not in TABLES:
-                note("", f"unknown table [{key}]; {near(key, TABLES)}")
+                note("", f"unknown table [{key}]; {suggest(key, TABLES)}")
         about = self._table(
             "machine", ("name", "title", "model", "nominal", "form"), required=("name", "model")
         )
@@ -91,73 +156,35 @@ class _Reader:
         nominal = about.get("nominal", "rough")
         if nominal not in PRIORS:
             note("[machine] nominal", f"{str(nominal)[:40]!r}: expected {' or '.join(PRIORS)}")
-        form = (
+        if "form" in about:
             self._mistakes.number("[machine] form", about["form"], 1e-6, 0.5)
-            if "form" in about
-            else None
+        return about
+
+    def _component_tables(self) -> Mapping[str, Any]:
+        """Return the tables of the components, written down and implied."""
+        tables = self._document.get("components")
+        if isinstance(tables, Mapping) and tables:
+            return tables
+        self._mistakes.note(
+            "",
+            "it has no [components.NAME]; expected at least what moves it and what is observed",
         )
-        mechanism = self._mechanism(about)
-        if mechanism is not None:
-            self._document = expand(self._document, mechanism, self._mistakes)
-        given = self._document.get("components")
-        if not isinstance(given, Mapping) or not given:
-            note(
-                "",
-                "it has no [components.NAME]; expected at least what moves it and what is observed",
-            )
-            given = {}
-        if mechanism is None:
-            return None
-        components = Components(mechanism, self._mistakes)
-        for each, table in given.items():
-            components.add(each, table)
-        control = self._control(components)
-        reader = Replays(mechanism, components, control, self._mistakes)
-        replays = reader.read(self._document.get("replays", []))
-        physics = reader.physics(replays)
-        hum = self._table("mains", ("frequency",)).get("frequency", 50.0)
-        mains = self._mistakes.number("[mains] frequency", hum, 1.0, 400.0)
-        experiments = self._experiments()
-        limits = read_limits(self._document.get("limits", {}), components.found, self._mistakes)
-        if self._document.get("limits") and not physics.declares_limits:
-            note("[limits]", f"{physics.title} has its own, the settings of safety")
-        if self._mistakes:
-            return None
-        reader.tolerate_timing(replays)
-        values = {**components.values, "computer": Computer(), "mains": Mains(mains)}
-        return Machine(
-            name=name,
-            title=str(about.get("title", name)),
-            path=self._path,
-            model=self._model_path(about),
-            plant=physics.assemble(values),
-            kind=physics.name,
-            components=components.found,
-            tolerances=tuple(components.tolerances),
-            replays=replays,
-            control=control,
-            prior=PRIORS[nominal],
-            form=form,
-            sources=components.sources,
-            told=components.told,
-            experiments=experiments,
-            limits=limits,
-            next_tests=self._next_tests(),
-            overlooked=physics.list_overlooked(mechanism, components.found, replays),
-        )
+        return {}
 
     def _next_tests(self) -> tuple[str, ...]:
-        given = self._document.get("experiments", {})
-        return tuple(map(str, given.get("propose", ()))) if "python" in given else ()
+        """Return the names of the tests that a diagnosis may propose."""
+        tables = self._document.get("experiments", {})
+        return tuple(map(str, tables.get("propose", ()))) if "python" in tables else ()
 
     def _experiments(self) -> str | Mapping[str, Any]:
-        given = self._document.get("experiments", {})
-        if isinstance(given, Mapping) and isinstance(given.get("python"), str):
-            return str(given["python"])
-        if not isinstance(given, Mapping):
+        """Return the experiments: the Python module that defines them, or their tables."""
+        tables = self._document.get("experiments", {})
+        if isinstance(tables, Mapping) and isinstance(tables.get("python"), str):
+            return str(tables["python"])
+        if not isinstance(tables, Mapping):
             self._mistakes.note("[experiments]", "expected tables, [experiments.NAME]")
             return {}
-        for name, table in given.items():
+        for name, table in tables.items():
             where = f"[experiments.{name}]"
             if not isinstance(table, Mapping):
                 self._mistakes.note(where, "expected a table")
@@ -182,11 +209,12 @@ class _Reader:
                     self._mistakes.note(
                         f"{where} demands.{channel}", f"{text!r}: expected a formula of time alone"
                     )
-        return given
+        return tables
 
     def _table(
         self, name: str, known: tuple[str, ...], required: tuple[str, ...] = ()
     ) -> Mapping[str, Any]:
+        """Return a table of the description; note unknown and missing keys."""
         table = self._document.get(name, {})
         if not isinstance(table, Mapping):
             self._mistakes.note(f"[{name}]", "expected a table")
@@ -198,12 +226,13 @@ class _Reader:
         return table
 
     def _model_path(self, about: Mapping[str, Any]) -> Path:
-        """Beside the description, or where the project keeps its models."""
+        """Return the path of the model: beside the description, or else a shipped one."""
         beside = self._path.parent / str(about.get("model", ""))
         shipped = Path(str(files("models"))) / "xml" / str(about.get("model", ""))
         return shipped if not beside.is_file() and shipped.is_file() else beside
 
     def _mechanism(self, about: Mapping[str, Any]) -> Mechanism | None:
+        """Return the compiled model, or None if it cannot be compiled, which is noted."""
         if not isinstance(about.get("model"), str):
             if "model" in about:
                 self._mistakes.note("[machine] model", "expected the name of an MJCF file")
@@ -215,6 +244,7 @@ class _Reader:
             return None
 
     def _control(self, components: Components) -> Control | None:
+        """Return the controller of the description; None without one or with a mistake."""
         if "controller" not in self._document:
             return None
         if "python" in self._document["controller"]:
@@ -222,47 +252,38 @@ class _Reader:
         return self._formula_control(components)
 
     def _python_control(self) -> Control | None:
+        """Return the controller written in Python that the description names."""
         name = self._table("controller", ("python",))["python"]
         if name not in PYTHON:
-            self._mistakes.note("[controller] python", f"{name!r}; {near(name, PYTHON)}")
+            self._mistakes.note("[controller] python", f"{name!r}; {suggest(name, PYTHON)}")
         return PYTHON.get(str(name))
 
     def _formula_control(self, components: Components) -> Control | None:
+        """Return the controller that the description writes as a formula."""
         table = self._table(
             "controller",
             ("output", "formula", "inputs", "settings", "exact"),
             required=("output", "formula"),
         )
-        settings, inputs = table.get("settings", {}), table.get("inputs", {})
-        if not isinstance(settings, Mapping):
-            self._mistakes.note("[controller] settings", "expected a table of numbers")
+        values = self._controller_settings(table.get("settings", {}))
+        if values is None:
             return None
+        inputs = table.get("inputs", {})
         if not isinstance(inputs, Mapping):
             self._mistakes.note(
                 "[controller] inputs", 'expected a table, such as { position = "/sensor.position" }'
             )
             return None
-        for key in settings:
-            if not NAME.fullmatch(key):
-                self._mistakes.note(
-                    "[controller] settings",
-                    f"{key[:40]!r} cannot be a setting's name; expected letters, digits and _",
-                )
-                return None
-        values = {
-            key: self._mistakes.number(f"[controller] settings.{key}", v, -1e300, 1e300)
-            for key, v in settings.items()
-        }
         outputs = {
             c.channel[1]: n
-            for n, c in components.found.items()
+            for n, c in components.by_name.items()
             if components.types[n] in MOVING and c.channel
         }
         output = str(table.get("output", ""))
         if "output" in table and output not in outputs:
             self._mistakes.note(
                 "[controller] output",
-                f"no actuator takes the command {output!r}; {near(output, outputs)}",
+                f"no actuator takes the command {output!r}; {suggest(output, outputs)}",
             )
         try:
             compiled: Formula = formula(str(table.get("formula", "0")), values)
@@ -274,12 +295,44 @@ class _Reader:
                 "[controller] formula",
                 f"{compiled.text!r:.60} reads nothing; expected a sensor or a demand in it",
             )
-        unused = [key for key in settings if not re.search(rf"\b{re.escape(key)}\b", compiled.text)]
+        unused = [key for key in values if not re.search(rf"\b{re.escape(key)}\b", compiled.text)]
         if unused:
             self._mistakes.note("[controller] settings", f"{', '.join(unused)} not in the formula")
+        channels = self._input_channels(compiled, inputs, components)
+        exact = None
+        if "exact" in table:
+            exact = self._mistakes.number("[controller] exact", table["exact"], 1e-300, 1e9)
+        return FormulaControl(output, compiled, channels, exact)
+
+    def _controller_settings(self, settings: object) -> dict[str, float] | None:
+        """Return the controller's settings by name; None for a table that is none, or a name that
+        a formula cannot contain."""
+        if not isinstance(settings, Mapping):
+            self._mistakes.note("[controller] settings", "expected a table of numbers")
+            return None
+        for key in settings:
+            if not NAME.fullmatch(key):
+                self._mistakes.note(
+                    "[controller] settings",
+                    f"{key[:40]!r} cannot be a setting's name; expected letters, digits and _",
+                )
+                return None
+        return {
+            key: self._mistakes.number(f"[controller] settings.{key}", value, -1e300, 1e300)
+            for key, value in settings.items()
+        }
+
+    def _input_channels(
+        self, compiled: Formula, inputs: Mapping[str, Any], components: Components
+    ) -> dict[str, Channel]:
+        """Return the channel of every name in the formula.
+
+        The table `inputs` has priority, then a sensor of that name. Any further name is a demand,
+        which recordings store in the topic of the commands.
+        """
         channels: dict[str, Channel] = {}
         for name in compiled.inputs:
-            known = components.found.get(name)
+            known = components.by_name.get(name)
             wanted = inputs.get(name)
             if wanted is not None:
                 topic, _, field = str(wanted).partition(".")
@@ -293,7 +346,4 @@ class _Reader:
                 channels[name] = known.channel
             else:
                 channels[name] = ("/command", name)
-        exact = None
-        if "exact" in table:
-            exact = self._mistakes.number("[controller] exact", table["exact"], 1e-300, 1e9)
-        return FormulaControl(output, compiled, channels, exact)
+        return channels

@@ -1,4 +1,4 @@
-"""Effects by name in the settings of a test, put in or taken out."""
+"""Effects added to, or removed from, the settings of a test by their name."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ from rigtwin.errors import RigtwinError
 def with_effect(
     configuration: Configuration, effect: Effect, values: Mapping[str, float]
 ) -> Configuration:
-    """The configuration with an effect.
+    """Return a configuration with an effect.
 
     Parameters
     ----------
     configuration
-        To start from; it stays as it is.
+        Configuration to start from; it is not modified.
     effect
-        One that the plant can have.
+        Effect that the plant can have.
     values
-        Parameter → value.
+        Parameter → value, in the parameter's unit.
 
     Returns
     -------
     Configuration
-        With it.
+        Copy with the effect.
 
     Raises
     ------
@@ -40,64 +40,68 @@ def with_effect(
 
 
 def without_effect(configuration: Configuration, name: str) -> Configuration:
-    """The configuration with an effect of the nominal machine taken out: its magnitude set to 0.
+    """Return a configuration without an effect of the nominal machine: its magnitude is 0.
 
     Parameters
     ----------
     configuration
-        To start from; it stays as it is.
+        Configuration to start from; it is not modified.
     name
-        Such as `coulomb@rail`.
+        Name of the effect, such as `coulomb@rail`.
 
     Returns
     -------
     Configuration
-        Without it.
+        Copy without the effect.
 
     Raises
     ------
     RigtwinError
-        If the machine has none of it to take out.
+        If the machine does not have the effect.
     """
     effect = find(name, configuration.plant)
     if not _is_removable(effect, configuration.plant):
-        there = [
-            each.name
-            for each in candidates(configuration.plant)
-            if _is_removable(each, configuration.plant)
+        removable = [
+            candidate.name
+            for candidate in candidates(configuration.plant)
+            if _is_removable(candidate, configuration.plant)
         ]
         raise RigtwinError(
-            f"cannot take out {name}: the twin has none of it; it has {', '.join(there) or 'none'}"
+            f"cannot take out {name}: the twin has none of it; "
+            f"it has {', '.join(removable) or 'none'}"
         )
     return with_effect(configuration, effect, {effect.kind.parameters[0]: 0.0})
 
 
 def _is_removable(effect: Effect, plant: Plant) -> bool:
+    """Return whether a magnitude of 0 means that the effect is absent, and the plant has it."""
     parameter, quantity = next(iter(effect.quantities().items()))
-    there = effect.nominal(plant)[parameter]
-    return effect.searched and there not in (0.0, quantity.high) and quantity.low <= 0.0
+    magnitude = effect.nominal(plant)[parameter]
+    # A limit, such as of saturation, is absent at its upper bound rather than at 0.
+    return effect.searched and magnitude not in (0.0, quantity.high) and quantity.low <= 0.0
 
 
 def apply_effects(configuration: Configuration, texts: Sequence[str]) -> Configuration:
-    """The configuration with effects as `--effect` takes them.
+    """Return a configuration with effects as `--effect` takes them.
 
     Parameters
     ----------
     configuration
-        To start from; it stays as it is.
+        Configuration to start from; it is not modified.
     texts
-        `coulomb@rail=80`, `stribeck@rail=20,stribeck_velocity=0.02`, or `setting@controller=kp:0.5`
-        for a setting that is not what the recording will say.
+        Effects such as `coulomb@rail=80` or `stribeck@rail=20,stribeck_velocity=0.02`. The text
+        `setting@controller=kp:0.5` changes a setting of the controller without storing it in the
+        recording.
 
     Returns
     -------
     Configuration
-        With them.
+        Copy with the effects.
 
     Raises
     ------
     RigtwinError
-        Naming the effect and what is allowed.
+        For an unknown effect, parameter or value. The message names what is allowed.
     """
     for text in texts:
         name, equals, values = text.partition("=")

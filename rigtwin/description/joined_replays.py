@@ -1,4 +1,4 @@
-"""A replay of joints that act on each other: all moved as measured, or some free to move."""
+"""Reader of a replay of coupled joints: all with prescribed motion, or some free to move."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from typing import Any
 from rigtwin.description.component_tables import PUSHING, SENSED, Components
 from rigtwin.description.machine import ReplayOf, Row
 from rigtwin.description.mechanism import Mechanism
-from rigtwin.description.mistakes import Mistakes, near
+from rigtwin.description.mistakes import Mistakes, suggest
 from rigtwin.errors import RigtwinError
 
 MOVERS = (*PUSHING, "position actuator", "position sensor")
-"""Types of component that move a machine some of whose joints are free."""
+"""Types of component that can move a machine with free joints."""
 
 
 class JoinedReplays:
-    """Reads such replays of a machine whose components are known."""
+    """Reader of replays of coupled joints; the machine's components are read before."""
 
     def __init__(self, mechanism: Mechanism, components: Components, mistakes: Mistakes) -> None:
         self._mechanism, self._components, self._mistakes = mechanism, components, mistakes
@@ -24,10 +24,27 @@ class JoinedReplays:
     def read_moved(
         self, where: str, name: str, table: Mapping[str, Any], movers: list[str], rows: list[Row]
     ) -> ReplayOf | None:
-        """Of joints that all move, each as its position sensor measured."""
-        found, types = self._components.found, self._components.types
+        """Return a replay whose joints all move as their position sensors measured.
+
+        Such a replay predicts forces by inverse dynamics. The result is None for a replay with
+        mistakes, which are noted.
+
+        Parameters
+        ----------
+        where
+            Place in the description, for messages.
+        name
+            Name of the replay.
+        table
+            Table of the replay.
+        movers
+            Components that move the joints.
+        rows
+            Observed signals.
+        """
+        known, types = self._components.by_name, self._components.types
         before = len(self._mistakes)
-        joints = [found[mover].joint for mover in movers]
+        joints = [known[mover].joint for mover in movers]
         for mover, joint in zip(movers, joints, strict=True):
             if SENSED.get(types[mover]) != "position" or not joint:
                 self._mistakes.note(
@@ -40,7 +57,7 @@ class JoinedReplays:
             elif joints.count(joint) > 1:
                 self._mistakes.note(where, f"joint {joint} is moved by two sensors; expected one")
         for row in rows:
-            if row.kind != "force" or found[row.name].joint not in joints:
+            if row.kind != "force" or known[row.name].joint not in joints:
                 self._mistakes.note(
                     where,
                     f"{row.name} cannot be observed where all joints move as measured; expected "
@@ -55,9 +72,37 @@ class JoinedReplays:
     def read_coupled(
         self, where: str, name: str, table: Mapping[str, Any], movers: list[str], rows: list[Row]
     ) -> ReplayOf | None:
-        """Of joints some of which nothing prescribes."""
-        found, types, before = self._components.found, self._components.types, len(self._mistakes)
-        free, known = table["free"], self._mechanism.names("joint")
+        """Return a replay with free joints, whose motion forward dynamics predict.
+
+        The arguments are those of `read_moved`; the key `free` of the table names the free joints.
+        """
+        before = len(self._mistakes)
+        free = self._read_free(where, table["free"])
+        if free is None:
+            return None
+        prescribed = self._prescribed_joints(where, movers, free)
+        self._check_ties(where, free, prescribed)
+        # Joints that equalities tie to moving ones move too, and may be observed and pushed.
+        moving = {*free, *prescribed}
+        moving |= {tie.joint for tie in self._mechanism.ties_of(moving)[0]}
+        self._check_signals(where, movers, rows, moving, check_movers=len(self._mistakes) == before)
+        if "band" in table:
+            self._mistakes.note(where, "band is for joints that all move as measured")
+        if len(self._mistakes) > before:
+            return None
+        return self._put_together(
+            where=where,
+            name=name,
+            table=table,
+            movers=movers,
+            rows=rows,
+            joints=[*free, *prescribed],
+            free=tuple(free),
+        )
+
+    def _read_free(self, where: str, free: object) -> list[str] | None:
+        """Return the free joints of a replay; None where they are no joints of the model."""
+        known = self._mechanism.names("joint")
         if not isinstance(free, list) or not free or not all(isinstance(j, str) for j in free):
             self._mistakes.note(
                 where,
@@ -69,8 +114,15 @@ class JoinedReplays:
             return None
         for joint in dict.fromkeys(free):
             if free.count(joint) > 1:
-                self._mistakes.note(where, f"free: {joint} stands there twice")
-        held = []
+                self._mistakes.note(where, f"free: joint {joint} is listed twice; expected it once")
+        return free
+
+    def _prescribed_joints(
+        self, where: str, movers: Sequence[str], free: Sequence[str]
+    ) -> list[str]:
+        """Return the joints whose motion a mover prescribes; note movers that do not fit."""
+        known, types = self._components.by_name, self._components.types
+        prescribed: list[str] = []
         for mover in movers:
             if types[mover] not in MOVERS:
                 self._mistakes.note(
@@ -78,65 +130,67 @@ class JoinedReplays:
                     f"moved_by {mover}, which is a {types[mover]}; where joints are free, expected "
                     "force actuators, servos, position actuators or position sensors",
                 )
-            elif not found[mover].acts_on:
+            elif not known[mover].acts_on:
                 self._mistakes.note(where, f"moved_by {mover}: it acts on no joint")
             elif types[mover] not in PUSHING:
-                joint = found[mover].joint
-                if not joint or joint in free or joint in held:
-                    said = "is of no single joint" if not joint else f"prescribes joint {joint}"
+                joint = known[mover].joint
+                if not joint or joint in free or joint in prescribed:
+                    role = "is of no single joint" if not joint else f"prescribes joint {joint}"
                     wrong = ", which is free" if joint in free else " a second time" * bool(joint)
-                    self._mistakes.note(where, f"moved_by {mover}: it {said}{wrong}")
-                held.append(joint)
-        moving = {*free, *held}
-        self._check_ties(where, free, held)
-        moving |= {tie.joint for tie in self._mechanism.ties_of(moving)[0]}
+                    self._mistakes.note(where, f"moved_by {mover}: it {role}{wrong}")
+                prescribed.append(joint)
+        return prescribed
+
+    def _check_signals(
+        self,
+        where: str,
+        movers: Sequence[str],
+        rows: Sequence[Row],
+        moving: set[str],
+        check_movers: bool,
+    ) -> None:
+        """Note observed signals of joints that stand still, and forces on such joints.
+
+        check_movers: whether to check the forces, which needs joints without mistakes.
+        """
+        known, types = self._components.by_name, self._components.types
         for row in rows:
-            if row.kind == "command" or not {j for j, _ in found[row.name].acts_on} & moving:
+            if row.kind == "command" or not {j for j, _ in known[row.name].acts_on} & moving:
+                check_movers = False
                 self._mistakes.note(
                     where,
                     f"{row.name} cannot be observed; expected sensors of "
                     f"{', '.join(sorted(moving))}",
                 )
-        for mover in movers if len(self._mistakes) == before else ():
-            acted = [joint for joint, _ in found[mover].acts_on]
-            if types[mover] in PUSHING and acted and not moving.intersection(acted):
+        for mover in movers if check_movers else ():
+            joints = [joint for joint, _ in known[mover].acts_on]
+            if types[mover] in PUSHING and joints and not moving.intersection(joints):
                 self._mistakes.note(
                     where,
-                    f"moved_by {mover}: it pushes {', '.join(acted)}, which stands still; expected "
-                    f"a joint that moves: {', '.join(sorted(moving))}",
+                    f"moved_by {mover}: it pushes {', '.join(joints)}, which stands still; "
+                    f"expected a joint that moves: {', '.join(sorted(moving))}",
                 )
-        if "band" in table:
-            self._mistakes.note(where, "band is for joints that all move as measured")
-        if len(self._mistakes) > before:
-            return None
-        return self._put_together(
-            where=where,
-            name=name,
-            table=table,
-            movers=movers,
-            rows=rows,
-            joints=[*free, *held],
-            free=tuple(free),
-        )
 
     def _note_no_joints(self, where: str, unknown: list[str], known: list[str]) -> None:
-        """Notes names that are no joints, once for all that follows from them."""
-        components = [name for name in unknown if name in self._components.found]
-        said = ", ".join(map(repr, unknown))
-        joints = {name: self._components.found[name].joint for name in components}
-        of = ", ".join(f"{joint} (of {name})" for name, joint in joints.items() if joint)
-        hint = f"expected joints of the MJCF: {of}" if of else near(unknown[0], known)
-        what = "components" if len(components) == len(unknown) else "no joints"
+        """Note names that are no joints, in one line that also covers what follows from them."""
+        components = [name for name in unknown if name in self._components.by_name]
+        quoted = ", ".join(map(repr, unknown))
+        # Writing a component's name where its joint's is expected is the usual mistake.
+        joints = {name: self._components.by_name[name].joint for name in components}
+        hints = ", ".join(f"{joint} (of {name})" for name, joint in joints.items() if joint)
+        hint = f"expected joints of the MJCF: {hints}" if hints else suggest(unknown[0], known)
+        noun = "components" if len(components) == len(unknown) else "no joints"
         if len(unknown) == 1:
-            what = "a component" if components else "no joint"
+            noun = "a component" if components else "no joint"
         self._mistakes.note(
-            where, f"free: {said} {'is' if len(unknown) == 1 else 'are'} {what}; {hint}"
+            where, f"free: {quoted} {'is' if len(unknown) == 1 else 'are'} {noun}; {hint}"
         )
 
-    def _check_ties(self, where: str, free: Sequence[str], held: Sequence[str]) -> None:
-        """Notes free joints that equalities tie to another joint that moves anyway."""
-        moving: list[str] = [*filter(None, held)]
-        # The joint that the MJCF makes dependent is the one to leave out.
+    def _check_ties(self, where: str, free: Sequence[str], prescribed: Sequence[str]) -> None:
+        """Note free joints that an equality ties to a joint that moves by itself."""
+        moving: list[str] = [*filter(None, prescribed)]
+        # Independent joints come first, so that the message asks to leave out the joint that the
+        # MJCF declares dependent.
         dependent = {tie.joint for tie in self._mechanism.ties()}
         for joint in sorted(dict.fromkeys(free), key=dependent.__contains__):
             ordered, _ = self._mechanism.ties_of(moving)
@@ -160,6 +214,7 @@ class JoinedReplays:
         joints: Sequence[str],
         free: tuple[str, ...],
     ) -> ReplayOf | None:
+        """Return the replay; None if its first joint is neither a hinge nor a slide."""
         try:
             first = next(self._mechanism.joint(joint) for joint in joints)
         except RigtwinError as error:

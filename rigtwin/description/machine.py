@@ -1,5 +1,5 @@
-"""A machine as its description gives it: components with nominal values and tolerances, and how
-recordings replay them."""
+"""A described machine: components with nominal values and tolerances, and the replays that compare
+them with recordings."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ from rigtwin.errors import RigtwinError
 from rigtwin.recording import Recording
 
 FORM = {"position": 0.003, "velocity": 0.003, "force": 0.01, "command": 0.01}
-"""Kind of signal → share of it that no model is held to, where a description does not say: of
-forces less is known."""
+"""Kind of signal → default model error, as a share of the signal. Forces are modelled less
+accurately than motions."""
 OWN = "own"
-"""Of a recording's controller settings: that it was none that the machine describes."""
+"""Entry of a recording's controller settings that marks a custom controller."""
 TURNING = {
     "m": "rad",
     "N": "Nm",
@@ -40,15 +40,35 @@ TURNING = {
     "m/N": "rad/Nm",
     "Ns^2/m^2": "Nms^2/rad^2",
 }
-"""Unit of a joint that slides → that of one that turns."""
+"""Unit of a quantity at a slide → its unit at a hinge."""
 
 
 @dataclass(frozen=True)
 class Component:
-    """One component. element: what of the MJCF it is, with that name; joint: the joint that it
-    belongs to; channel: where recordings hold its signal, topic and field; unit: of that signal;
-    kinds: of effects that it may have, None for all; acts_on: joints that a force along its
-    own coordinate acts on, how far that goes for each unit of theirs; turns: is it an angle?"""
+    """One component of a described machine.
+
+    Attributes
+    ----------
+    name
+        Name in the description.
+    element
+        Kind of MJCF element that the component stands for, such as `joint`.
+    mjcf
+        Name of that element in the MJCF.
+    joint
+        Joint that the component belongs to; empty if it belongs to several or none.
+    channel
+        Topic and field of its signal in recordings; None without a signal.
+    unit
+        Unit of the signal.
+    kinds
+        Kinds of effects that it may have; None for all kinds of its type.
+    acts_on
+        Joints on which a force along the component's coordinate acts, with the change of the
+        coordinate per unit of the joint's position.
+    turns
+        Whether the coordinate is an angle.
+    """
 
     name: str
     element: str
@@ -63,8 +83,19 @@ class Component:
 
 @dataclass(frozen=True)
 class Row:
-    """One observed signal. kind: position, velocity, force or command; name: its component's, or
-    the command's."""
+    """One observed signal, which a replay predicts.
+
+    Attributes
+    ----------
+    name
+        Name of the sensor, or of the controller's command.
+    kind
+        Kind of signal: `position`, `velocity`, `force` or `command`.
+    channel
+        Topic and field in recordings.
+    unit
+        Unit of the signal.
+    """
 
     name: str
     kind: str
@@ -74,9 +105,25 @@ class Row:
 
 @dataclass(frozen=True)
 class Joint:
-    """What the MJCF says of a replay's joint. inertia: kg, or kg m² if it turns, `armature` of it
-    included, which turns with the motor alone and has no weight; gravity: load N or Nm at each of
-    `positions`, over its range; rest: where its spring is slack."""
+    """Mechanics of a replay's joint, from the MJCF, with all other joints at rest.
+
+    Attributes
+    ----------
+    name
+        Name of the joint.
+    turns
+        Whether the joint is a hinge.
+    inertia
+        Moving inertia with the armature, kg, or kg m² of a hinge.
+    positions
+        Positions over the joint's range, m or rad.
+    gravity
+        Gravity load at these positions, N or Nm.
+    rest
+        Position at which the joint's spring is relaxed, m or rad.
+    armature
+        Part of the inertia that turns with the motor and has no weight, kg or kg m².
+    """
 
     name: str
     turns: bool
@@ -88,19 +135,40 @@ class Joint:
 
     @property
     def goes_round(self) -> bool:
-        """Whether its range is a whole turn, after which all is as before."""
+        """Whether the range is a whole turn, so that both of its ends are the same position."""
         whole = self.positions[-1] - self.positions[0]
         return self.turns and math.isclose(whole, 2.0 * math.pi)
 
 
 @dataclass(frozen=True)
 class ReplayOf:
-    """How a joint is replayed, or several that act on each other: then `joint` is the first of
-    them. moved_by: the components whose signals move it: a position sensor prescribes its motion, a
-    position actuator its motion through that actuator, a force actuator pushes it. closed: whether
-    the controller commands that actuator, or the recording does; band: Hz up to which its signals
-    are judged, None for all that is measured; rotor: the component that the joint's motor turns;
-    free: joints that nothing prescribes, which go as the forces on them have it."""
+    """Replay of one joint, or of several coupled joints.
+
+    Attributes
+    ----------
+    name
+        Name of the replay.
+    joint
+        Replayed joint; the first one of coupled joints.
+    moved_by
+        Components whose recorded signals move the joint. A position sensor prescribes the measured
+        motion, a position actuator the motion that follows its command, and a force actuator or
+        servo exerts a force.
+    rows
+        Observed signals.
+    guide
+        Component with the joint's friction, stiffness and gravity; None without one.
+    mass
+        Component with the moving mass; None without one.
+    closed
+        Whether the simulated controller commands the actuator, instead of the recorded command.
+    band
+        Frequency up to which signals are judged, Hz; None for the whole measured band.
+    rotor
+        Component with the inertia of the joint's motor; None without one.
+    free
+        Joints whose motion follows by forward dynamics.
+    """
 
     name: str
     joint: Joint
@@ -116,15 +184,48 @@ class ReplayOf:
 
 @dataclass(frozen=True)
 class Machine:
-    """The whole description.
+    """Machine as its description defines it.
 
-    plant: a NamedTuple of components with their nominal values; kind: name of its physics;
-    prior: belief in the nominal values; form: share of a signal that no model is held
-    to, None for the usual one; told: `component.parameter` → setting of the recording's controller
-    that says its value; experiments: Python module that has them, or tables of the description;
-    limits: settings of what ends a test, a NamedTuple;
-    next_tests: those that a diagnosis may propose; overlooked: what of the MJCF is not taken into
-    account, a line each; excluded: names of effects that are not searched for.
+    Attributes
+    ----------
+    name
+        Name of the machine, which its recordings carry.
+    title
+        Title for people.
+    path
+        Path of the description.
+    model
+        Path of the MJCF or URDF.
+    plant
+        NamedTuple of the components with their nominal values.
+    kind
+        Name of the machine's physics.
+    components
+        Component name → component.
+    tolerances
+        Declared tolerances of parameters.
+    replays
+        Replays that compare the machine with a recording.
+    control
+        Described controller; None without one.
+    prior
+        Belief in the nominal values.
+    form
+        Model error as a share of a signal; None for the default of the signal's kind.
+    sources
+        `component.parameter` → source of its value.
+    parameter_settings
+        `component.parameter` → controller setting whose recorded value is the parameter's value.
+    experiments
+        Name of the Python module with the experiments, or their tables in the description.
+    limits
+        Settings of the limits that end a test, a NamedTuple.
+    next_tests
+        Tests that a diagnosis may propose.
+    overlooked
+        Features of the MJCF that the models ignore, one line per feature.
+    excluded
+        Names of effects that are not searched for.
     """
 
     name: str
@@ -140,7 +241,7 @@ class Machine:
     prior: ModelPrior
     form: float | None
     sources: Mapping[str, str] = field(default_factory=dict, repr=False)
-    told: Mapping[str, str] = field(default_factory=dict, repr=False)
+    parameter_settings: Mapping[str, str] = field(default_factory=dict, repr=False)
     experiments: str | Mapping[str, Any] = field(default_factory=dict, repr=False)
     limits: Any = field(default_factory=Nothing)
     next_tests: tuple[str, ...] = ()
@@ -149,44 +250,55 @@ class Machine:
 
     @property
     def physics(self) -> Physics:
-        """Everything that depends on the kind of machine."""
+        """Physics of the machine: everything that depends on its kind."""
         return physics_named(self.kind)
 
     @property
     def files(self) -> tuple[Path, ...]:
-        """What it was read from: the description, the model and what that includes."""
+        """Files that define the machine: the description, the model and its included files."""
         return (self.path, *list_files(self.model))
 
     @property
     def configuration(self) -> Configuration:
-        """The settings of its twin as described."""
+        """Settings of the twin as described."""
         return self.physics.configure(self)
 
     def configuration_of(
         self, recording: Recording, base: Configuration | None = None
     ) -> Configuration:
-        """The settings of the twin of a recording: what the operator wrote down over `base`, by
-        default the description's.
+        """Return the settings of the twin of a recording.
 
-        Raises RigtwinError for settings that the machine does not have.
+        Parameters
+        ----------
+        recording
+            Recording whose timing and controller settings the twin takes over.
+        base
+            Settings to start from. Defaults to the described ones.
+
+        Raises
+        ------
+        RigtwinError
+            If the recording has settings that the machine lacks.
         """
         start = self.configuration if base is None else base
         period = recording.period
+        # The timestep divides the recording's period, and is at most the described one.
         steps = max(1, math.ceil(period / start.timing.timestep - 1e-9))
         duration = max(recording.ticks * period, 0.01)
         changes: dict[str, dict[str, object]] = {
             "timing": {"period": period, "duration": duration, "timestep": period / steps},
         }
-        # Settings of another machine say nothing of this one; that it is another is said elsewhere.
-        own = recording.machine == self.name
-        given = {n: value for n, value in recording.controller.items() if own and n != OWN}
-        if given and self.control is not None:
-            changes["controller"] = given
-        for parameter, setting in self.told.items():
+        # Settings of another machine do not apply here. That the machines differ is reported by the
+        # callers.
+        applies = recording.machine == self.name
+        recorded = {n: value for n, value in recording.controller.items() if applies and n != OWN}
+        if recorded and self.control is not None:
+            changes["controller"] = recorded
+        for parameter, setting in self.parameter_settings.items():
             group, _, name = parameter.partition(".")
-            # What the operator says is there is there, unless the twin was given another.
-            if setting in given and getattr(start.plant, group) == getattr(self.plant, group):
-                changes.setdefault(group, {})[name] = given[setting]
+            # A base with a changed component has priority over the operator's note of its value.
+            if setting in recorded and getattr(start.plant, group) == getattr(self.plant, group):
+                changes.setdefault(group, {})[name] = recorded[setting]
         try:
             return override(start, changes)
         except RigtwinError as error:
@@ -194,18 +306,18 @@ class Machine:
 
     @property
     def rows(self) -> tuple[Row, ...]:
-        """All observed signals, replay by replay."""
+        """All observed signals, in the order of the replays."""
         return tuple(row for replay in self.replays for row in replay.rows)
 
     @property
     def units(self) -> dict[str, str]:
-        """Channel, as `/topic.field`, → unit, of the components' channels."""
+        """Channel of a component, as `/topic.field` → unit."""
         return {
             ".".join(c.channel): c.unit for c in self.components.values() if c.channel is not None
         }
 
     def form_of(self, row: Row) -> float:
-        """Share of a signal that no model is held to."""
+        """Return the model error of an observed signal, as a share of the signal."""
         return self.form if self.form is not None else FORM[row.kind]
 
     def effects(self) -> Iterator[Effect]:
@@ -230,7 +342,7 @@ class Machine:
                 yield effect
 
     def excluding(self, names: Iterable[str]) -> Machine:
-        """The same machine, some of whose effects are not searched for.
+        """Return the machine without some of its effects, which a diagnosis then does not search.
 
         Parameters
         ----------
@@ -259,15 +371,18 @@ class Machine:
         return replace(self, excluded=frozenset(excluded))
 
     def tolerance_of(self, group: str, parameter: str) -> Tolerance | None:
-        """The declared tolerance of a parameter, or of one that means the same, if there is one."""
-        for wanted in (parameter, SAME_AS.get(parameter)):
-            for each in self.tolerances:
-                if (each.group, each.parameter) == (group, wanted):
-                    return each
+        """Return the declared tolerance of a parameter; None without one.
+
+        A parameter without a declared tolerance takes that of its synonym in `SYNONYMS`.
+        """
+        for name in (parameter, SYNONYMS.get(parameter)):
+            for tolerance in self.tolerances:
+                if (tolerance.group, tolerance.parameter) == (group, name):
+                    return tolerance
         return None
 
     def unit(self, group: str, quantity: Quantity) -> str:
-        """The unit of a component's parameter."""
+        """Return the unit of a component's parameter, with angular units at a hinge."""
         component = self.components.get(group)
         unit = quantity.unit
         if component is None:
@@ -277,5 +392,5 @@ class Machine:
         return TURNING.get(unit, unit) if component.turns else unit
 
 
-SAME_AS = {"gain": "constant", "lag": "delay"}
-"""Parameter → the one that has the same meaning and may have the declared tolerance."""
+SYNONYMS = {"gain": "constant", "lag": "delay"}
+"""Parameter → parameter with the same effect, whose declared tolerance covers both."""

@@ -1,4 +1,4 @@
-"""What a description needs of an MJCF: its named elements, and what moves with a joint."""
+"""Compiled MJCF of a description: its named elements, and the mechanics of its joints."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ OBJECTS = {
     "tendon": mujoco.mjtObj.mjOBJ_TENDON,
     "contact": mujoco.mjtObj.mjOBJ_PAIR,
 }
-"""Element of an MJCF that can be a component → MuJoCo's name for it."""
+"""Element of an MJCF that can be a component → MuJoCo's object type."""
 GRID = 1441
-"""Positions at which a joint's gravity load is worked out."""
+"""Number of positions at which a joint's gravity load is tabulated: every 0.25° of a whole turn."""
 TURN = float(np.pi)
-"""rad; how far to either side a joint without a range turns."""
+"""Range of a hinge without limits, to either side, rad."""
 SENSORS = {
     mujoco.mjtSensor.mjSENS_JOINTPOS: "position",
     mujoco.mjtSensor.mjSENS_ACTUATORPOS: "position",
@@ -43,32 +43,59 @@ SENSORS = {
     mujoco.mjtSensor.mjSENS_ACTUATORFRC: "force",
     mujoco.mjtSensor.mjSENS_FORCE: "force",
 }
-"""Sensor of an MJCF → what it measures."""
+"""Type of a MuJoCo sensor → quantity that it measures."""
 
 
 class Tie(NamedTuple):
-    """An equality between joints: joint = apart + ratio · to; number: of the equality."""
+    """Linear equality between two joints: q_joint = offset + ratio · q_to.
+
+    Attributes
+    ----------
+    joint
+        Dependent joint.
+    to
+        Joint that it follows.
+    ratio
+        Ratio of the two positions, in their units.
+    offset
+        Position of the dependent joint where the other one is at 0, m or rad.
+    number
+        Index of the equality in the model.
+    """
 
     joint: str
     to: str
     ratio: float
-    apart: float
+    offset: float
     number: int
 
-    def turned(self) -> Tie:
-        """The same with both joints exchanged; its ratio must not be zero."""
-        return Tie(self.to, self.joint, 1.0 / self.ratio, -self.apart / self.ratio, self.number)
+    def swapped(self) -> Tie:
+        """Return the same equality solved for the other joint. The ratio must not be zero."""
+        return Tie(self.to, self.joint, 1.0 / self.ratio, -self.offset / self.ratio, self.number)
 
 
 MASSLESS = 1e-6
-"""kg, and kg m² times as much again, of a link that a URDF gives no mass: MuJoCo wants some."""
+"""Mass of a URDF link without inertia, kg. MuJoCo refuses moving bodies without mass; the square
+of this number is the inertia, kg m²."""
 
 
 def compile_model(
     path: Path, alter: Callable[[mujoco.MjSpec], None] | None = None
 ) -> mujoco.MjModel:
-    """The model of an MJCF or a URDF, altered before it is compiled. Raises ValueError if it is
-    none."""
+    """Return the compiled model of an MJCF or a URDF.
+
+    Parameters
+    ----------
+    path
+        Path of the MJCF or URDF.
+    alter
+        Function that changes the model's specification before it is compiled.
+
+    Raises
+    ------
+    ValueError
+        If MuJoCo cannot compile the file.
+    """
     urdf = path.suffix.lower() == ".urdf"
     if not urdf and alter is None:
         return mujoco.MjModel.from_xml_path(str(path))
@@ -81,12 +108,19 @@ def compile_model(
 
 
 class Mechanism:
-    """An MJCF, compiled."""
+    """Compiled MJCF or URDF.
+
+    Attributes
+    ----------
+    model
+        Compiled model.
+    """
 
     def __init__(self, path: Path) -> None:
-        """Raises RigtwinError if it is none."""
+        """Compile a file. Raises RigtwinError if it is missing or cannot be compiled."""
         if not path.is_file():
             raise RigtwinError(f"model {path} does not exist")
+        # The text is checked first: compiling a hostile file may take for ever or all memory.
         check_text(path)
         try:
             self.model = compile_model(path)
@@ -95,7 +129,7 @@ class Mechanism:
         check_values(path, self.model)
 
     def names(self, element: str) -> list[str]:
-        """Names of all elements of a sort."""
+        """Return the names of all elements of a kind; elements without a name are left out."""
         kind = OBJECTS[element]
         count = {
             "body": self.model.nbody,
@@ -105,21 +139,24 @@ class Mechanism:
             "tendon": self.model.ntendon,
             "contact": self.model.npair,
         }[element]
-        found = [mujoco.mj_id2name(self.model, kind, number) for number in range(count)]
-        return [name for name in found if name]
+        names = [mujoco.mj_id2name(self.model, kind, number) for number in range(count)]
+        return [name for name in names if name]
 
     def number(self, element: str, name: str) -> int:
+        """Return the index of a named element in the model; -1 without one."""
         return int(mujoco.mj_name2id(self.model, OBJECTS[element], name))
 
     def joint_name(self, number: int) -> str:
+        """Return the name of the joint with an index; empty if it has no name."""
         return mujoco.mj_id2name(self.model, mujoco.mjtObj.mjOBJ_JOINT, number) or ""
 
     def joint_of(self, element: str, name: str) -> str:
-        """The joint that an element belongs to; empty if it belongs to none alone."""
+        """Return the joint that an element belongs to; empty if it belongs to none or several."""
         model, number = self.model, self.number(element, name)
         if element == "joint":
             return name
         if element == "body":
+            # A body without a joint is welded to its parent, and moves with the parent's joint.
             while number > 0 and model.body_jntnum[number] == 0:
                 number = int(model.body_parentid[number])
             return (
@@ -133,39 +170,39 @@ class Mechanism:
                 return self.joint_name(int(model.actuator_trnid[number, 0]))
             return ""
         if element == "sensor":
-            kind, what = int(model.sensor_objtype[number]), int(model.sensor_objid[number])
+            kind, target = int(model.sensor_objtype[number]), int(model.sensor_objid[number])
             if kind == mujoco.mjtObj.mjOBJ_JOINT:
-                return self.joint_name(what)
+                return self.joint_name(target)
             if kind == mujoco.mjtObj.mjOBJ_ACTUATOR:
                 return self.joint_of(
-                    "actuator", mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_ACTUATOR, what) or ""
+                    "actuator", mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_ACTUATOR, target) or ""
                 )
         return ""
 
     def measures(self, name: str) -> str:
-        """What a sensor measures: position, velocity or force; empty for anything else."""
+        """Return the quantity that a sensor measures: position, velocity or force, else empty."""
         return SENSORS.get(
             mujoco.mjtSensor(int(self.model.sensor_type[self.number("sensor", name)])), ""
         )
 
     def positions(self, name: str) -> bool:
-        """Whether an actuator takes a position as its command."""
+        """Return whether an actuator takes a position as its command."""
         return lies_at_command(self.model, self.number("actuator", name))
 
     def actuator_timing(self, name: str) -> dict[str, float]:
-        """Delay and lag of an actuator's command, s, as far as the MJCF gives them."""
+        """Return delay and lag of an actuator's command, s; see `actuator_law.read_timing`."""
         return read_timing(self.model, self.number("actuator", name))
 
     def rest_position(self, name: str) -> dict[str, float]:
-        """Gain and offset of a position actuator's rest position, where it is not its command."""
+        """Return gain and offset of an actuator's rest position; see `actuator_law`."""
         return rest_position(self.model, self.number("actuator", name))
 
     def actuator_obstacle(self, name: str, kind: str) -> str | None:
-        """What of an actuator a component of this type cannot express; None for nothing."""
+        """Return the first property of an actuator that a component of this type cannot express."""
         return find_obstacle(self.model, self.number("actuator", name), kind)
 
     def command_limits(self, name: str) -> tuple[float, float]:
-        """Between which an actuator takes its command (infinite if there are none)."""
+        """Return the range of an actuator's command; infinite without limits."""
         number = self.number("actuator", name)
         if not self.model.actuator_ctrllimited[number]:
             return -np.inf, np.inf
@@ -173,34 +210,42 @@ class Mechanism:
         return float(low), float(high)
 
     def force_per_command(self, name: str) -> tuple[float, float]:
-        """A force actuator's constant and limit, N or Nm (infinite if there is none)."""
+        """Return a force actuator's force per command, and its limit, N or Nm (or infinite)."""
         number = self.number("actuator", name)
         gear, gain = (
             float(self.model.actuator_gear[number, 0]),
             float(self.model.actuator_gainprm[number, 0]),
         )
+        # MuJoCo limits the force before the gear, so the limit at the joint is |gear| · forcerange.
         limit = np.inf
         if self.model.actuator_forcelimited[number]:
             limit = abs(gear) * float(self.model.actuator_forcerange[number, 1])
         return gear * gain, limit
 
     def servo(self, name: str) -> dict[str, float] | None:
-        """A position actuator's gains and its force's limit, by the parameters of a Servo; None if
-        it is none, or acts through a gear."""
+        """Return a position actuator's gains and force limit as parameters of a Servo.
+
+        The force of a servo is kp · (command − position) − kv · velocity, so that bias₁ = −gain.
+        The result is None for an actuator with another law or with a gear.
+        """
         model, number = self.model, self.number("actuator", name)
         gain, bias = float(model.actuator_gainprm[number, 0]), model.actuator_biasprm[number]
         affine = int(model.actuator_biastype[number]) == mujoco.mjtBias.mjBIAS_AFFINE
-        same = np.isclose(bias[1], -gain) and gain != 0.0
-        if not affine or not same or float(model.actuator_gear[number, 0]) != 1.0:
+        proportional = np.isclose(bias[1], -gain) and gain != 0.0
+        if not affine or not proportional or float(model.actuator_gear[number, 0]) != 1.0:
             return None
-        found = {"position_gain": gain, "damping_gain": max(-float(bias[2]), 0.0)}
+        parameters = {"position_gain": gain, "damping_gain": max(-float(bias[2]), 0.0)}
         if model.actuator_forcelimited[number]:
-            found["force_limit"] = float(model.actuator_forcerange[number, 1])
-        return found
+            parameters["force_limit"] = float(model.actuator_forcerange[number, 1])
+        return parameters
 
     def acts_on(self, element: str, name: str) -> tuple[tuple[str, float], ...]:
-        """Joints that a force along an element's own coordinate acts on, and how far that goes for
-        each unit of theirs: a fixed tendon has several; none where there is no such coordinate."""
+        """Return the joints on which a force along an element's coordinate acts.
+
+        Every joint comes with the change of the coordinate per unit of the joint's position. The
+        coordinate of a fixed tendon is Σ cᵢ · qᵢ, which has several joints. An element without a
+        coordinate, such as a spatial tendon, has none.
+        """
         model, number = self.model, self.tendon_of(element, name)
         if number is None:
             joint = self.joint_of(element, name)
@@ -214,7 +259,7 @@ class Mechanism:
         )
 
     def tendon_of(self, element: str, name: str) -> int | None:
-        """The number of the tendon that an element is, pulls or measures; None if it is none."""
+        """Return the index of the tendon that an element is, pulls or measures; None without."""
         model, number = self.model, self.number(element, name)
         if element == "tendon":
             return number
@@ -222,18 +267,19 @@ class Mechanism:
             pulls = int(model.actuator_trntype[number]) == mujoco.mjtTrn.mjTRN_TENDON
             return int(model.actuator_trnid[number, 0]) if pulls else None
         if element == "sensor":
-            kind, what = int(model.sensor_objtype[number]), int(model.sensor_objid[number])
+            kind, target = int(model.sensor_objtype[number]), int(model.sensor_objid[number])
             if kind == mujoco.mjtObj.mjOBJ_TENDON:
-                return what
+                return target
             if kind == mujoco.mjtObj.mjOBJ_ACTUATOR:
-                by = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_ACTUATOR, what) or ""
-                return self.tendon_of("actuator", by) if by else None
+                actuator = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_ACTUATOR, target) or ""
+                return self.tendon_of("actuator", actuator) if actuator else None
         return None
 
     def ties(self) -> tuple[Tie, ...]:
-        """The joints that equalities tie to another, one in proportion to the other."""
-        model, found = self.model, []
+        """Return the active equalities that make one joint follow another one linearly."""
+        model, ties = self.model, []
         for number in range(model.neq):
+            # MuJoCo: y − y₀ = a₀ + a₁(x − x₀) + a₂(x − x₀)² + …, where qpos0 holds x₀ and y₀.
             polynomial = model.eq_data[number, :5]
             if (
                 model.eq_type[number] != mujoco.mjtEq.mjEQ_JOINT
@@ -243,16 +289,17 @@ class Mechanism:
             ):
                 continue
             tied, to = int(model.eq_obj1id[number]), int(model.eq_obj2id[number])
-            here, there = (float(model.qpos0[model.jnt_qposadr[joint]]) for joint in (tied, to))
+            y_zero, x_zero = (float(model.qpos0[model.jnt_qposadr[joint]]) for joint in (tied, to))
             ratio = float(polynomial[1])
-            apart = here + float(polynomial[0]) - ratio * there
-            found.append(Tie(self.joint_name(tied), self.joint_name(to), ratio, apart, number))
-        return tuple(found)
+            offset = y_zero + float(polynomial[0]) - ratio * x_zero
+            ties.append(Tie(self.joint_name(tied), self.joint_name(to), ratio, offset, number))
+        return tuple(ties)
 
     def ties_of(self, moving: Iterable[str]) -> tuple[tuple[Tie, ...], tuple[Tie, ...]]:
-        """The ties that make further joints move with some joints, whatever the order in which the
-        MJCF has them: a chain is followed link by link, and a tie is turned round where the joint
-        that it names second is the one that moves along.
+        """Return the ties that make further joints follow moving ones.
+
+        The order of the ties in the MJCF does not matter: a chain is followed link by link, and a
+        tie is solved for its second joint where that joint is the one that follows.
 
         Parameters
         ----------
@@ -262,37 +309,37 @@ class Mechanism:
         Returns
         -------
         tuple
-            Ties in an order in which each one's `to` is known before, and the ties between two
-            joints that move anyway.
+            Ties in the order of evaluation, in which every `to` is known before its `joint`; and
+            the ties between two joints that already move.
         """
-        known, rest = set(moving), list(self.ties())
+        known, remaining = set(moving), list(self.ties())
         ordered: list[Tie] = []
         while True:
-            ahead = next((t for t in rest if (t.joint in known) != (t.to in known)), None)
-            if ahead is None:
+            tie = next((t for t in remaining if (t.joint in known) != (t.to in known)), None)
+            if tie is None:
                 break
-            rest.remove(ahead)
-            if ahead.joint in known and ahead.ratio == 0.0:
+            remaining.remove(tie)
+            # With a ratio of 0 the dependent joint is fixed, and says nothing of the other one.
+            if tie.joint in known and tie.ratio == 0.0:
                 continue
-            ordered.append(ahead if ahead.to in known else ahead.turned())
+            ordered.append(tie if tie.to in known else tie.swapped())
             known.add(ordered[-1].joint)
-        return tuple(ordered), tuple(t for t in rest if t.joint in known and t.to in known)
+        return tuple(ordered), tuple(t for t in remaining if t.joint in known and t.to in known)
 
     def turns(self, joint: str) -> bool:
-        """Whether a joint is a hinge."""
+        """Return whether a joint is a hinge."""
         kind = int(self.model.jnt_type[self.number("joint", joint)])
         return kind == mujoco.mjtJoint.mjJNT_HINGE
 
     def armature(self, element: str, name: str) -> float:
-        """The inertia that the MJCF gives a joint or a tendon for itself, kg or kg m²."""
+        """Return the armature of a joint or a tendon, kg or kg m²."""
         number = self.number(element, name)
         if element == "tendon":
             return float(self.model.tendon_armature[number])
         return float(self.model.dof_armature[int(self.model.jnt_dofadr[number])])
 
     def friction(self, element: str, name: str) -> dict[str, float]:
-        """What the MJCF gives a joint or a tendon of friction and stiffness, by the parameters of a
-        Guide."""
+        """Return friction, damping and stiffness of a joint or tendon as parameters of a Guide."""
         model, number = self.model, self.number(element, name)
         if element == "tendon":
             dry, damping = model.tendon_frictionloss[number], model.tendon_damping[number]
@@ -321,8 +368,10 @@ class Mechanism:
         }
 
     def joint(self, name: str) -> Joint:
-        """What moves with a joint, all others at rest. Raises RigtwinError if it neither slides nor
-        turns about one axis."""
+        """Return the mechanics of a joint with all others at rest.
+
+        Raises RigtwinError unless the joint is a slide or a hinge.
+        """
         model, number = self.model, self.number("joint", name)
         kind = int(model.jnt_type[number])
         if kind not in (mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtJoint.mjJNT_HINGE):
@@ -336,6 +385,7 @@ class Mechanism:
         low, high = (float(v) for v in model.jnt_range[number])
         if not model.jnt_limited[number]:
             low, high = (-TURN, TURN) if turns else (-1.0, 1.0)
+        # At rest MuJoCo's bias force c(q, 0) is the gravity load alone.
         positions = np.linspace(low, high, GRID)
         load = np.empty(GRID)
         for step, position in enumerate(positions):
@@ -343,6 +393,7 @@ class Mechanism:
             mujoco.mj_forward(model, data)
             load[step] = data.qfrc_bias[at]
         rest = float(model.qpos_spring[place])
+        # Without gravity two points are enough, which keeps interpolation fast.
         gravity = tuple(load.tolist()) if np.any(np.abs(load) > 1e-12) else (0.0, 0.0)
         where = tuple(positions.tolist()) if len(gravity) == GRID else (low, high)
         armature = self.armature("joint", name)

@@ -1,4 +1,4 @@
-"""Mistakes in a description, collected while reading goes on, one line each."""
+"""Mistakes in a description. They are collected while it is read, one line per mistake."""
 
 from __future__ import annotations
 
@@ -10,20 +10,26 @@ from typing import Any
 
 
 class Mistakes(list[str]):
-    """Every line says where, what, and what was expected."""
+    """List of mistakes. A line states the place, the mistake and the expected value."""
 
-    def note(self, where: str, what: str) -> None:
-        self.append(f"{where}: {what}" if where else what)
+    def note(self, where: str, mistake: str) -> None:
+        """Add a mistake. where: place in the description; empty for the whole description."""
+        self.append(f"{where}: {mistake}" if where else mistake)
 
     def unknown(self, where: str, table: Mapping[str, Any], known: Iterable[str]) -> None:
-        """Notes the keys of a table that mean nothing."""
+        """Note every key of a table that is not known."""
         known = list(known)
         for key in table:
             if key not in known:
-                self.note(where, f"unknown key {key!r}; {near(key, known)}")
+                self.note(where, f"unknown key {key!r}; {suggest(key, known)}")
 
     def number(self, where: str, value: object, low: float, high: float) -> float:
-        """The value if it is a number between the bounds; else the lower one, and a mistake."""
+        """Return a number between two bounds.
+
+        A value that is no such number is noted, and the lower bound returned, so that reading goes
+        on and further mistakes are found.
+        """
+        # bool is a subclass of int, but `true` is no number in TOML; a huge int overflows a float.
         number = math.nan
         if isinstance(value, int | float) and not isinstance(value, bool):
             with suppress(OverflowError):
@@ -35,8 +41,8 @@ class Mistakes(list[str]):
         return low
 
 
-def near(word: object, known: Iterable[str]) -> str:
-    """What was probably meant, and what there is."""
+def suggest(word: object, known: Iterable[str]) -> str:
+    """Return the known name that is most like a word, and the list of known names, as a text."""
     names = list(known)
     close = difflib.get_close_matches(str(word), names, 1)
     return (

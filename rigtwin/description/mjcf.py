@@ -1,5 +1,5 @@
-"""The user's MJCF with other values: only the attributes that change are written, everything else
-stays as it is, to the letter."""
+"""Writer of the user's MJCF with changed values. Only the changed attributes are rewritten; every
+other byte of the file, with its comments and layout, stays the same."""
 
 from __future__ import annotations
 
@@ -27,16 +27,30 @@ ATTRIBUTES: dict[type, dict[str, str]] = {
     Rotor: {"inertia": "armature"},
     Servo: {"position_gain": "kp", "damping_gain": "kv"},
 }
-"""Component → parameter → attribute of its joint, tendon or position actuator."""
+"""Type of component → parameter → attribute of its joint, tendon or position actuator."""
 PARENTS = {"joint": "body", "tendon": "tendon", "actuator": "actuator"}
-"""Element of a description → what its tag stands in."""
-HEAVY = ("mass", "diaginertia", "fullinertia", "density")
-"""Attributes that go with the mass."""
+"""Element of a description → tag that encloses the element's tag."""
+INERTIAL = ("mass", "diaginertia", "fullinertia", "density")
+"""Attributes that are proportional to the mass."""
 
 
 @dataclass(eq=False)
 class Tag:
-    """A start tag. first: where it begins in the file, bytes; parent: None of the root."""
+    """Start tag of an element.
+
+    Attributes
+    ----------
+    name
+        Name of the tag, such as `joint`.
+    attributes
+        Attribute → value.
+    first
+        Offset of its first byte in the file.
+    parent
+        Tag that encloses it; None for the root.
+    children
+        Tags that it encloses directly.
+    """
 
     name: str
     attributes: dict[str, str]
@@ -45,23 +59,32 @@ class Tag:
     children: list[Tag] = field(default_factory=list)
 
     def walk(self) -> Iterator[Tag]:
-        """Itself and all in it."""
+        """Yield the tag and all tags inside of it."""
         yield self
         for child in self.children:
             yield from child.walk()
 
 
 class Document:
-    """An MJCF as text whose attributes can be set."""
+    """Text of an MJCF, whose attributes can be set.
+
+    Attributes
+    ----------
+    path
+        Path of the MJCF.
+    root
+        Tag of the root.
+    """
 
     def __init__(self, path: Path) -> None:
-        """Raises RigtwinError if it cannot be read."""
+        """Read a file. Raises RigtwinError if it cannot be read or is no XML."""
         self.path = path
         try:
             self._text = path.read_bytes()
         except OSError as error:
             raise RigtwinError(f"cannot read {path}: {error.strerror}") from None
         self._edits: dict[int, dict[str, str]] = {}
+        # expat states the byte offset of every tag, which a tree of elements would not keep.
         stack: list[Tag] = []
         parser = expat.ParserCreate()
 
@@ -84,10 +107,13 @@ class Document:
             raise RigtwinError(f"model {path}: {error}") from None
 
     def find(self, element: str, name: str) -> Tag:
-        """The tag of a named joint, tendon, actuator or body. Raises RigtwinError."""
+        """Return the tag of a named joint, tendon, actuator or body.
+
+        Raises RigtwinError if the file has none, which may then be in an included file.
+        """
         for tag in self.root.walk():
-            own = tag.name == "body" if element == "body" else self._is_of(tag, element)
-            if own and tag.attributes.get("name") == name:
+            matches = tag.name == "body" if element == "body" else self._is_of(tag, element)
+            if matches and tag.attributes.get("name") == name:
                 return tag
         raise RigtwinError(
             f"{self.path.name} has no {element} {name!r} itself; one that it includes may have it, "
@@ -96,16 +122,19 @@ class Document:
 
     @staticmethod
     def _is_of(tag: Tag, element: str) -> bool:
+        """Return whether a tag is a joint, tendon or actuator of the model."""
+        # Defaults and keyframes use the same tag names, so the enclosing tag decides.
         inside = tag.parent is not None and tag.parent.name == PARENTS[element]
         return inside and (element != "joint" or tag.name == "joint")
 
     def set(self, tag: Tag, attribute: str, value: str) -> None:
-        """Gives a tag an attribute."""
+        """Set an attribute of a tag."""
         self._edits.setdefault(tag.first, {})[attribute] = value
 
     def text(self) -> bytes:
-        """The file with what was set."""
+        """Return the text of the file with the attributes that were set."""
         out = self._text
+        # From the end to the beginning, so that the offsets of earlier tags stay valid.
         for first in sorted(self._edits, reverse=True):
             last = _end_of_tag(out, first)
             tag = out[first:last].decode()
@@ -116,6 +145,7 @@ class Document:
 
 
 def _end_of_tag(text: bytes, first: int) -> int:
+    """Return the offset after a start tag. A `>` inside of quotes does not end the tag."""
     quote = 0
     for place in range(first, len(text)):
         byte = text[place]
@@ -129,9 +159,10 @@ def _end_of_tag(text: bytes, first: int) -> int:
 
 
 def _with_attribute(tag: str, attribute: str, value: str) -> str:
-    found = re.search(rf"(\s{attribute}\s*=\s*)(\"[^\"]*\"|'[^']*')", tag)
-    if found is not None:
-        return tag[: found.start()] + f'{found.group(1)}"{value}"' + tag[found.end() :]
+    """Return a start tag with an attribute replaced or appended."""
+    match = re.search(rf"(\s{attribute}\s*=\s*)(\"[^\"]*\"|'[^']*')", tag)
+    if match is not None:
+        return tag[: match.start()] + f'{match.group(1)}"{value}"' + tag[match.end() :]
     end = re.search(r"\s*/?>$", tag)
     assert end is not None
     return f'{tag[: end.start()]} {attribute}="{value}"{tag[end.start() :]}'
@@ -139,7 +170,17 @@ def _with_attribute(tag: str, attribute: str, value: str) -> str:
 
 @dataclass(frozen=True)
 class Change:
-    """A component's parameter, and its new value."""
+    """New value of a component's parameter.
+
+    Attributes
+    ----------
+    component
+        Name of the component.
+    parameter
+        Name of the parameter.
+    value
+        New value, in the parameter's unit.
+    """
 
     component: str
     parameter: str
@@ -147,21 +188,21 @@ class Change:
 
 
 def write_mjcf(path: Path, machine: Machine, changes: Sequence[Change]) -> tuple[str, ...]:
-    """Writes a machine's MJCF with other values.
+    """Write a machine's MJCF with changed values.
 
     Parameters
     ----------
     path
-        Where to. Files that the MJCF names are looked for beside it.
+        File to write. MuJoCo resolves relative paths in an MJCF against the folder of that file.
     machine
-        Whose it is, with the values that the MJCF has.
+        Machine with the MJCF and its present values.
     changes
-        What is other.
+        Values to change.
 
     Returns
     -------
     tuple of str
-        What MJCF has no attribute for, a line each.
+        Changes for which MJCF has no attribute, one line per change.
 
     Raises
     ------
@@ -172,16 +213,16 @@ def write_mjcf(path: Path, machine: Machine, changes: Sequence[Change]) -> tuple
         raise RigtwinError(f"{machine.model.name} is a URDF; expected an MJCF")
     if path.exists() and path.samefile(machine.model):
         raise RigtwinError(f"{path} is the machine's own model; name another output")
-    document, left = Document(machine.model), []
+    document, unwritten = Document(machine.model), []
     for change in changes:
         if not _apply(document, machine, change, changes):
-            left.append(f"{change.component}.{change.parameter} = {change.value:.6g}")
+            unwritten.append(f"{change.component}.{change.parameter} = {change.value:.6g}")
     atomic_write(path, document.text())
-    return tuple(left)
+    return tuple(unwritten)
 
 
 def _apply(document: Document, machine: Machine, change: Change, changes: Sequence[Change]) -> bool:
-    """Whether the change has a place in the document, which then has it."""
+    """Set the attribute of a change. Return whether MJCF has such an attribute."""
     component = machine.components.get(change.component)
     if component is None:
         return False
@@ -192,7 +233,7 @@ def _apply(document: Document, machine: Machine, change: Change, changes: Sequen
         if component.element == "actuator" and (
             tag.name != "position" or "dampratio" in tag.attributes
         ):
-            # Another tag has other attributes, and a ratio would be what kv is worked out from.
+            # Only <position> has kp and kv, and MuJoCo computes kv from dampratio where it is set.
             return False
         document.set(tag, attribute, _number(change.value))
         return True
@@ -210,7 +251,7 @@ def _apply_to_actuator(
     change: Change,
     changes: Sequence[Change],
 ) -> bool:
-    """Whether an actuator's parameter has a place in the document, which then has it."""
+    """Set the attribute of an actuator's parameter. Return whether MJCF has such an attribute."""
     nominal = getattr(machine.plant, change.component)
     compiled = Mechanism(machine.model)
     model, number = compiled.model, compiled.number("actuator", component.mjcf)
@@ -224,14 +265,17 @@ def _apply_to_actuator(
         document.set(tag, "dyntype", "filterexact" if change.value > 0.0 else "none")
         document.set(tag, "dynprm", _number(change.value))
     elif change.parameter in ("gain", "force_limit") and pushes:
-        said = {each.parameter: each.value for each in changes if each.component == component.name}
+        values = {
+            other.parameter: other.value for other in changes if other.component == component.name
+        }
         gear = np.array(model.actuator_gear[number])
-        gear[0] *= said.get("gain", nominal.gain) / nominal.gain
+        gear[0] *= values.get("gain", nominal.gain) / nominal.gain
         last = int(np.max(np.nonzero(gear)[0], initial=0)) + 1
-        if "gain" in said:
-            document.set(tag, "gear", " ".join(_number(each) for each in gear[:last]))
-        # MuJoCo limits the force before the gear; the limit stays where it was behind it.
-        limit = said.get("force_limit", nominal.force_limit)
+        if "gain" in values:
+            document.set(tag, "gear", " ".join(_number(ratio) for ratio in gear[:last]))
+        # MuJoCo limits the force before the gear. A changed gear must not move the limit at the
+        # joint, so forcerange is divided by the new gear.
+        limit = values.get("force_limit", nominal.force_limit)
         _set_force_limit(document, tag, limit / abs(float(gear[0])), limit)
     elif change.parameter == "force_limit" and isinstance(nominal, Servo):
         _set_force_limit(document, tag, change.value, change.value)
@@ -243,43 +287,52 @@ def _apply_to_actuator(
 def _set_delay(
     document: Document, tag: Tag, model: mujoco.MjModel, number: int, delay: float
 ) -> None:
-    """A delay, and a history that is long enough for it."""
+    """Set a delay, and a history that is long enough for it."""
     samples = delay / float(model.opt.timestep)
-    kept = max(math.ceil(samples - 1e-9) + 1, int(model.actuator_history[number, 0]))
+    history = max(math.ceil(samples - 1e-9) + 1, int(model.actuator_history[number, 0]))
     document.set(tag, "delay", _number(delay))
-    document.set(tag, "nsample", str(kept))
+    document.set(tag, "nsample", str(history))
+    # A delay between two samples is exact only if MuJoCo interpolates.
     if abs(samples - round(samples)) > 1e-6 and model.actuator_history[number, 1] == 0:
         document.set(tag, "interp", "linear")
 
 
 def _set_force_limit(document: Document, tag: Tag, limit: float, force: float) -> None:
+    """Set a symmetric range of the force unless it is unlimited.
+
+    limit: before the gear; force: at the joint.
+    """
     if force < UNLIMITED:
         document.set(tag, "forcelimited", "true")
         document.set(tag, "forcerange", f"{_number(-limit)} {_number(limit)}")
 
 
 def _scale_mass(document: Document, component: Component, share: float) -> bool:
-    """All bodies that move with the component's joint, by the same share; False if it is not told
-    in the file what they weigh."""
+    """Scale the mass of all bodies that move with the component's joint.
+
+    Return whether the file states all of these masses; otherwise nothing is changed.
+    """
     joint = document.find("joint", component.joint)
     assert joint.parent is not None
-    heavy = []
+    weighed: list[Tag] = []
     for body in joint.parent.walk():
         if body.name != "body":
             continue
+        # MuJoCo ignores the geoms of a body with <inertial> when it computes the mass.
         inertial = [tag for tag in body.children if tag.name == "inertial"]
-        told = inertial or [tag for tag in body.children if tag.name == "geom"]
-        if any(not set(HEAVY) & set(tag.attributes) for tag in told):
+        sources = inertial or [tag for tag in body.children if tag.name == "geom"]
+        if any(not set(INERTIAL) & set(tag.attributes) for tag in sources):
             return False
-        heavy += told
-    for tag in heavy:
-        # A geom with a mass has its density from that.
-        own = [name for name in HEAVY if name in tag.attributes]
-        for name in own[:1] if tag.name == "geom" else own:
-            scaled = (share * float(each) for each in tag.attributes[name].split())
-            document.set(tag, name, " ".join(_number(each) for each in scaled))
-    return bool(heavy)
+        weighed += sources
+    for tag in weighed:
+        # The mass of a geom overrides its density, so only the first attribute counts.
+        names = [name for name in INERTIAL if name in tag.attributes]
+        for name in names[:1] if tag.name == "geom" else names:
+            scaled = (share * float(number) for number in tag.attributes[name].split())
+            document.set(tag, name, " ".join(_number(number) for number in scaled))
+    return bool(weighed)
 
 
 def _number(value: float) -> str:
+    """Return a number as MJCF text, with 9 significant digits."""
     return f"{value:.9g}"

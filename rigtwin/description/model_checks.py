@@ -1,4 +1,5 @@
-"""Values of an MJCF that no machine has: too much for MuJoCo to be asked for, or no numbers."""
+"""Checks of an MJCF before and after it is compiled: excessive sizes, and values that are not
+physical."""
 
 from __future__ import annotations
 
@@ -14,16 +15,17 @@ import numpy as np
 from rigtwin.errors import RigtwinError
 
 MOST_COPIES = 10_000
-"""Elements that `replicate`, `flexcomp` and `composite` may make."""
+"""Largest number of elements that `replicate`, `flexcomp` and `composite` may make."""
 MOST_RESERVED = 10_000_000
-"""What an attribute of `size` may ask for, in its own unit."""
+"""Largest value of an attribute of `size`, except memory."""
 MOST_MEMORY = 4 * 2**30
-"""Bytes of `size memory`."""
+"""Largest value of `size memory`, bytes."""
 MOST_DEGREES = 300
-"""Degrees of freedom that a described machine may have."""
+"""Largest number of degrees of freedom of a described machine."""
 DEEPEST = 10
-"""Files that include each other."""
+"""Largest depth of nested includes."""
 UNITS = {"": 1, "K": 2**10, "M": 2**20, "G": 2**30, "T": 2**40, "P": 2**50, "E": 2**60}
+"""Suffix of `size memory` → bytes."""
 NOT_NEGATIVE = {
     "dof_damping": "damping",
     "dof_frictionloss": "frictionloss",
@@ -32,10 +34,10 @@ NOT_NEGATIVE = {
     "tendon_frictionloss": "frictionloss",
     "tendon_armature": "armature",
 }
-"""Array of a model → its attribute in MJCF; MuJoCo takes them negative, and then energy comes from
-nowhere."""
+"""Array of a model → its attribute in MJCF. MuJoCo accepts negative values, which would create
+energy."""
 RANGES = {"actuator_ctrlrange": "ctrlrange", "actuator_forcerange": "forcerange"}
-"""Array of a model → its attribute in MJCF; MuJoCo takes one the wrong way round for none."""
+"""Array of a model → its attribute in MJCF. MuJoCo ignores a range whose ends are exchanged."""
 OWNERS = {
     "body": mujoco.mjtObj.mjOBJ_BODY,
     "jnt": mujoco.mjtObj.mjOBJ_JOINT,
@@ -46,41 +48,57 @@ OWNERS = {
     "tendon": mujoco.mjtObj.mjOBJ_TENDON,
     "pair": mujoco.mjtObj.mjOBJ_PAIR,
 }
-"""How the names of a model's arrays begin → what they are of."""
+"""Prefix of the names of a model's arrays → type of the objects that the rows belong to."""
 
 
 def list_files(path: Path, depth: int = DEEPEST) -> tuple[Path, ...]:
-    """An MJCF and the files that it includes, those that are there."""
-    found, parser = [path], expat.ParserCreate()
+    """Return an MJCF and the files that it includes, as far as they exist.
+
+    Parameters
+    ----------
+    path
+        Path of the MJCF.
+    depth
+        Largest depth of nested includes, which ends a file that includes itself.
+    """
+    files, parser = [path], expat.ParserCreate()
 
     def begin(tag: str, attributes: dict[str, str]) -> None:
         if tag == "include" and "file" in attributes and depth > 0:
-            found.extend(list_files(path.parent / attributes["file"], depth - 1))
+            files.extend(list_files(path.parent / attributes["file"], depth - 1))
 
     parser.StartElementHandler = begin
-    # Who reads it for what is in it says what is wrong.
+    # Faults of the file are reported where it is compiled, with better messages.
     with suppress(OSError, expat.ExpatError):
         parser.Parse(path.read_bytes() if path.is_file() else b"<none/>", True)
-    return tuple(each for each in found if each.is_file())
+    return tuple(file for file in files if file.is_file())
 
 
 def check_text(path: Path) -> None:
-    """Raises RigtwinError for an MJCF that asks for more than any machine needs: compiling it would
-    take for ever or all memory."""
+    """Raise RigtwinError for an MJCF that asks for more elements or memory than any machine needs.
+
+    Compiling such a file would take all memory or never end, so the check reads the text alone.
+    """
     _check_file(path, path, 1, DEEPEST)
 
 
 def _check_file(path: Path, root: Path, copies: int, depth: int) -> None:
+    """Check one file and its includes.
+
+    copies: how often its elements are replicated; root: model whose folder includes refer to.
+    """
     if path.exists() and not path.is_file():
         raise RigtwinError(f"model {root}: it includes {path}; expected a file")
     try:
         text = path.read_bytes()
     except OSError:
-        return  # MuJoCo says what it misses, and finds files elsewhere too.
+        # MuJoCo also searches other folders for an included file, and names a missing one.
+        return
     _check_encoding(path, text)
     nested, parser = [copies], expat.ParserCreate()
 
     def begin(tag: str, attributes: dict[str, str]) -> None:
+        # Nested elements that replicate multiply.
         nested.append(nested[-1] * _copies(tag, attributes))
         if nested[-1] > MOST_COPIES:
             raise RigtwinError(
@@ -88,7 +106,7 @@ def _check_file(path: Path, root: Path, copies: int, depth: int) -> None:
                 f"expected at most {MOST_COPIES}"
             )
         for name, value in attributes.items():
-            # MuJoCo takes it for a value that is not given.
+            # MuJoCo marks attributes that are not set by NaN, and would ignore one in the file.
             if "nan" in value.lower().split():
                 raise RigtwinError(
                     f"model {path}, line {parser.CurrentLineNumber}: {name} of <{tag}> is "
@@ -106,12 +124,15 @@ def _check_file(path: Path, root: Path, copies: int, depth: int) -> None:
     try:
         parser.Parse(text, True)
     except expat.ExpatError:
-        return  # MuJoCo has a reader of its own, and says what it minds.
+        # MuJoCo's own parser decides which XML it accepts, and its message names the line.
+        return
 
 
 def _check_encoding(path: Path, text: bytes) -> None:
-    """MuJoCo takes a file's bytes as they are, whatever encoding its first line declares, and its
-    names have to be UTF-8."""
+    """Raise RigtwinError unless a file is UTF-8.
+
+    MuJoCo ignores the encoding that the XML declares, and its Python names must be UTF-8.
+    """
     try:
         text.decode()
     except UnicodeDecodeError as error:
@@ -123,14 +144,16 @@ def _check_encoding(path: Path, text: bytes) -> None:
 
 
 def _copies(tag: str, attributes: dict[str, str]) -> int:
+    """Return the number of elements that a tag makes of one: the product of its counts."""
     if tag not in ("replicate", "flexcomp", "composite"):
         return 1
-    numbers = [_number(each) for each in attributes.get("count", "1").split()]
-    # The least of each is a point in a line.
+    numbers = [_number(count) for count in attributes.get("count", "1").split()]
+    # A count of 0 or less still makes one element; the bound keeps the product in an int.
     return int(min(math.prod(max(number, 1.0) for number in numbers), 1e18))
 
 
 def _check_size(path: Path, attributes: dict[str, str]) -> None:
+    """Raise RigtwinError for a tag `size` that reserves too much."""
     for name, text in attributes.items():
         unit = text[-1:].upper() if name == "memory" else ""
         number = _number(text[:-1] if unit in UNITS and unit else text) * UNITS.get(unit, 1)
@@ -142,7 +165,7 @@ def _check_size(path: Path, attributes: dict[str, str]) -> None:
 
 
 def _number(text: str) -> float:
-    """0 for what is none, which MuJoCo names."""
+    """Return a number of the MJCF; 0 for a text that is none, which MuJoCo reports."""
     try:
         number = float(text)
     except ValueError:
@@ -151,14 +174,21 @@ def _number(text: str) -> float:
 
 
 def check_values(path: Path, model: mujoco.MjModel) -> None:
-    """Raises RigtwinError for a compiled model with values that no machine has, naming the first of
-    them."""
+    """Raise RigtwinError for the first value of a compiled model that no machine can have.
+
+    Parameters
+    ----------
+    path
+        Path of the MJCF, for the message.
+    model
+        Compiled MJCF.
+    """
     if model.nv > MOST_DEGREES:
         raise RigtwinError(
             f"model {path}: it has {model.nv} degrees of freedom; expected at most {MOST_DEGREES}"
         )
     for name, values in _arrays(model):
-        # A range may have no end.
+        # An infinite end of a range means that there is no limit.
         wrong = np.isnan(values) if name.endswith("range") else ~np.isfinite(values)
         if wrong.any():
             place = tuple(int(at) for at in np.argwhere(wrong)[0])
@@ -168,6 +198,7 @@ def check_values(path: Path, model: mujoco.MjModel) -> None:
             )
     for limits, attribute in RANGES.items():
         pairs = getattr(model, limits)
+        # A range of 0 0 is MuJoCo's default, which stands for no range.
         wrong = np.flatnonzero(pairs.any(axis=1) & ~(pairs[:, 0] < pairs[:, 1]))
         if len(wrong):
             low, high = pairs[wrong[0]]
@@ -186,6 +217,7 @@ def check_values(path: Path, model: mujoco.MjModel) -> None:
 
 
 def _arrays(model: mujoco.MjModel) -> Iterator[tuple[str, np.ndarray]]:
+    """Yield name and values of every floating-point option and array of a model."""
     for holder, prefix in ((model.opt, "option "), (model, "")):
         for name in dir(holder):
             value = None if name.startswith("_") else getattr(holder, name, None)
@@ -196,7 +228,7 @@ def _arrays(model: mujoco.MjModel) -> Iterator[tuple[str, np.ndarray]]:
 
 
 def _owner(model: mujoco.MjModel, name: str, place: tuple[int, ...]) -> str:
-    """What a value of an array is, in words."""
+    """Return the attribute and the element that a value of an array belongs to, as a text."""
     if name.startswith("option "):
         return name
     prefix, _, attribute = name.partition("_")
@@ -206,9 +238,11 @@ def _owner(model: mujoco.MjModel, name: str, place: tuple[int, ...]) -> str:
 
 
 def _element(model: mujoco.MjModel, name: str, number: int) -> str:
+    """Return kind and name of the element that a row of an array belongs to, as a text."""
     prefix = name.partition("_")[0]
+    # A joint has one to six degrees of freedom; messages name the joint.
     if prefix == "dof":
         prefix, number = "jnt", int(model.dof_jntid[number])
     kind = {"jnt": "joint"}.get(prefix, prefix)
-    called = mujoco.mj_id2name(model, OWNERS[prefix], number)
-    return f"{kind} {called!r}" if called else f"{kind} {number}, which has no name,"
+    label = mujoco.mj_id2name(model, OWNERS[prefix], number)
+    return f"{kind} {label!r}" if label else f"{kind} {number}, which has no name,"

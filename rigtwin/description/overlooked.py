@@ -1,4 +1,5 @@
-"""What of an MJCF a machine's replays do not take into account: said, never silently dropped."""
+"""Features of an MJCF that a machine's replays ignore. They are listed for the user instead of
+being dropped silently."""
 
 from __future__ import annotations
 
@@ -11,27 +12,27 @@ from rigtwin.description.machine import Component, ReplayOf
 from rigtwin.description.mechanism import Mechanism, Tie
 
 ELEMENTS = (("free", mujoco.mjtJoint.mjJNT_FREE), ("ball", mujoco.mjtJoint.mjJNT_BALL))
-"""Joints that no replay moves."""
+"""Types of joints that no replay moves, with their MJCF names."""
 
 
 def overlooked(
     mechanism: Mechanism, components: Mapping[str, Component], replays: Sequence[ReplayOf]
 ) -> tuple[str, ...]:
-    """What of a model is not taken into account.
+    """Return the features of a model that the replays ignore.
 
     Parameters
     ----------
     mechanism
-        The MJCF.
+        Compiled MJCF.
     components
-        Of the description.
+        Described components by name.
     replays
-        Of the description.
+        Described replays.
 
     Returns
     -------
-    tuple
-        A line each.
+    tuple of str
+        One line per feature.
     """
     model = mechanism.model
     ties = _followed_ties(mechanism, components, replays)
@@ -46,24 +47,26 @@ def overlooked(
 def _followed_ties(
     mechanism: Mechanism, components: Mapping[str, Component], replays: Sequence[ReplayOf]
 ) -> tuple[Tie, ...]:
-    """Equalities that a replay with free joints takes into account."""
+    """Return the equalities between joints that a replay with free joints obeys."""
     free = [joint for replay in replays for joint in replay.free]
     if not free:
         return ()
     movers = [components[name] for replay in replays for name in replay.moved_by]
-    held = [each.joint for each in movers if each.element != "actuator"]
-    led = {tie.joint for tie in mechanism.ties_of([*free, *held])[0]}
-    acted = [each.joint for each in movers if each.joint and each.joint not in led]
-    return mechanism.ties_of([*free, *held, *acted])[0]
+    prescribed = [mover.joint for mover in movers if mover.element != "actuator"]
+    dependent = {tie.joint for tie in mechanism.ties_of([*free, *prescribed])[0]}
+    # An actuator on a dependent joint pushes the joint that leads it, and moves nothing by itself.
+    pushed = [mover.joint for mover in movers if mover.joint and mover.joint not in dependent]
+    return mechanism.ties_of([*free, *prescribed, *pushed])[0]
 
 
 def _moving(components: Mapping[str, Component], replays: Sequence[ReplayOf]) -> set[str]:
-    """Joints that the replays move."""
+    """Return the joints that the replays move."""
     moving = {joint for replay in replays for joint in replay.free}
     return moving | {components[name].joint for replay in replays for name in replay.moved_by}
 
 
 def _name(model: mujoco.MjModel, kind: mujoco.mjtObj, number: int) -> str:
+    """Return the name of an element, or its index if it has no name."""
     return mujoco.mj_id2name(model, kind, number) or f"number {number}"
 
 
@@ -73,12 +76,13 @@ def _joints(
     replays: Sequence[ReplayOf],
     tied: set[str],
 ) -> Iterator[str]:
+    """Yield the joints that stand still, and the stops of those that move."""
     moved = _moving(components, replays)
     for number in range(model.njnt):
         name = _name(model, mujoco.mjtObj.mjOBJ_JOINT, number)
-        for said, kind in ELEMENTS:
+        for word, kind in ELEMENTS:
             if model.jnt_type[number] == kind:
-                yield f"joint {name}: it is a {said} joint, and stays where it is"
+                yield f"joint {name}: it is a {word} joint, and stays where it is"
                 break
         else:
             if name not in moved | tied:
@@ -88,13 +92,16 @@ def _joints(
 
 
 def _dissipation(model: mujoco.MjModel, components: Mapping[str, Component]) -> Iterator[str]:
-    """Dry friction that no component stands for: it is none of what MuJoCo's inverse dynamics
-    give without constraints."""
-    described = {(each.element, each.mjcf) for each in components.values() if each.channel is None}
+    """Yield joints and tendons with dry friction that no component stands for.
+
+    MuJoCo treats dry friction as a constraint, so that inverse dynamics without constraints leave
+    it out. Components model it instead.
+    """
+    described = {(part.element, part.mjcf) for part in components.values() if part.channel is None}
     for number in range(model.njnt):
         name = _name(model, mujoco.mjtObj.mjOBJ_JOINT, number)
-        lost = model.dof_frictionloss[model.jnt_dofadr[number]]
-        if lost > 0.0 and ("joint", name) not in described:
+        friction = model.dof_frictionloss[model.jnt_dofadr[number]]
+        if friction > 0.0 and ("joint", name) not in described:
             yield f"joint {name}: its frictionloss, as it is no component"
     for number in range(model.ntendon):
         name = _name(model, mujoco.mjtObj.mjOBJ_TENDON, number)
@@ -102,12 +109,13 @@ def _dissipation(model: mujoco.MjModel, components: Mapping[str, Component]) -> 
             yield f"tendon {name}: it is no component"
 
 
-def _constraints(model: mujoco.MjModel, kept: set[int]) -> Iterator[str]:
-    """kept: equalities that are taken into account."""
+def _constraints(model: mujoco.MjModel, followed: set[int]) -> Iterator[str]:
+    """Yield contacts, equalities and plugins. followed: indices of equalities that replays obey."""
+    # A contact takes two geoms whose contype and conaffinity allow it.
     touching = np.count_nonzero((model.geom_contype != 0) | (model.geom_conaffinity != 0))
     if touching > 1 or model.npair:
         yield "contacts between its geoms"
-    for number in sorted(set(range(model.neq)) - kept):
+    for number in sorted(set(range(model.neq)) - followed):
         yield f"equality {_name(model, mujoco.mjtObj.mjOBJ_EQUALITY, number)}"
     if model.nflex:
         yield "flexible bodies"
@@ -116,9 +124,8 @@ def _constraints(model: mujoco.MjModel, kept: set[int]) -> Iterator[str]:
 
 
 def _actuators(model: mujoco.MjModel, components: Mapping[str, Component]) -> Iterator[str]:
-    """Force laws of actuators that are no component, and forces that are limited on one side more
-    than on the other."""
-    described = {each.mjcf for each in components.values() if each.element == "actuator"}
+    """Yield actuators without a component that act without a command, and asymmetric limits."""
+    described = {part.mjcf for part in components.values() if part.element == "actuator"}
     for number in range(model.nactuator):
         name = _name(model, mujoco.mjtObj.mjOBJ_ACTUATOR, number)
         bias = model.actuator_biasprm[number]

@@ -50,7 +50,7 @@ class Physics(ABC):
     name : str
         Name of the kind, stored with the machine.
     title : str
-        What such a machine is, for messages.
+        Noun phrase for such a machine, for messages.
     replayed_whole : bool
         Whether a replay covers the whole machine instead of one joint.
     declares_limits : bool
@@ -87,7 +87,7 @@ class Physics(ABC):
         """Channel table of the card that such a machine is shipped with."""
         return None
 
-    # Description
+    # Description: which machines are of this kind, and how their plant is assembled.
 
     @abstractmethod
     def claims(self, types: Mapping[str, type], replays: Sequence[ReplayOf]) -> bool:
@@ -119,7 +119,7 @@ class Physics(ABC):
         """Return the machine as parts whose effects change no signal of another part."""
         return (machine,)
 
-    # Model and twin
+    # Model and twin: how a machine of this kind is simulated.
 
     @abstractmethod
     def model(
@@ -194,7 +194,7 @@ class Physics(ABC):
         """Return the sums of inertial parameters of which only the sum is observable."""
         return ()
 
-    # Diagnosis
+    # Diagnosis: how the gap between recording and twin is measured.
 
     @abstractmethod
     def residuals(
@@ -238,7 +238,7 @@ class Physics(ABC):
         """Return controller settings that the corrected plant asks for."""
         return {}
 
-    # Card and sessions
+    # Card and sessions: how a machine of this kind is connected and led through a test.
 
     @abstractmethod
     def signals(self, machine: Machine) -> Signals:
@@ -268,7 +268,7 @@ class Physics(ABC):
         machine
             Machine under test.
         experiment
-            What is demanded.
+            Experiment with the demands of the test.
         configuration
             Settings of the test.
         seed
@@ -321,8 +321,9 @@ BUILT_IN = (
     "rigtwin.joints.physics:PrescribedJoints",
     "rigtwin.joints.physics:IndependentJoints",
 )
-"""Kinds that are shipped, the most specific first. They stand above this module, which therefore
-names them instead of importing them."""
+"""Shipped kinds as `module:class`, the most specific first. Their modules import this one, which
+therefore names them instead of importing them."""
+# The only module-level state: kinds that users register, in the order in which they are asked.
 _registered: list[Physics] = []
 
 
@@ -338,20 +339,30 @@ def unregister(physics: Physics) -> None:
 
 @cache
 def _load(entry: str) -> Physics:
+    """Import a kind when it is first asked for, and keep it."""
     module, _, name = entry.partition(":")
     return getattr(import_module(module), name)()
 
 
 def _kinds() -> Iterator[Physics]:
+    """Yield all kinds in the order in which they are asked: registered ones first."""
     yield from _registered
     yield from map(_load, BUILT_IN)
 
 
 def find_physics(types: Mapping[str, type], replays: Sequence[ReplayOf]) -> Physics:
-    """Return the first kind that claims a machine, see `Physics.claims`."""
+    """Return the first kind that claims a machine, see `Physics.claims`.
+
+    Parameters
+    ----------
+    types
+        Component name → type.
+    replays
+        Replays of the description.
+    """
     return next(kind for kind in _kinds() if kind.claims(types, replays))
 
 
 def physics_named(name: str) -> Physics:
-    """Return the kind of a name."""
+    """Return the kind with a name, as `Physics.name` states it."""
     return next(kind for kind in _kinds() if kind.name == name)

@@ -1,8 +1,8 @@
-"""What is known of a rig after a diagnosis: the corrected twin, how sure each of its values is, and
-what else it could be.
+"""Posterior of a machine after a diagnosis: the corrected twin, the uncertainty of its values, and
+the alternative explanations.
 
-A calibrated twin's TOML has this as its table `posterior`, beside the values that `run` and
-`compare` take.
+The TOML file of a calibrated twin stores it in the table `posterior`, beside the values that `run`
+and `compare` take.
 """
 
 from __future__ import annotations
@@ -21,16 +21,25 @@ from rigtwin.description.configuration import Configuration, groups
 from rigtwin.errors import RigtwinError
 
 NORMAL_95 = 1.959964
-"""Standard deviations from the middle to the end of a 95 % interval."""
+"""Half width of a 95 % interval of the normal distribution, in standard deviations."""
 
 Changes = Mapping[str, Mapping[str, object]]
 """Component → parameter → value."""
 
 
 @dataclass(frozen=True)
-class Otherwise:
-    """Another explanation of the same recording: its name, its probability, and its twin's
-    values."""
+class Alternative:
+    """Alternative explanation of the same recording.
+
+    Attributes
+    ----------
+    effect
+        Name of the effect.
+    probability
+        Posterior probability of the explanation, 0 to 1.
+    changes
+        Values of the twin corrected by this explanation.
+    """
 
     effect: str
     probability: float
@@ -39,40 +48,70 @@ class Otherwise:
 
 @dataclass(frozen=True)
 class Posterior:
-    """changes: the corrected twin's values; intervals: `component.parameter` → 95 % interval of
-    those that were found; probability: of this explanation; otherwise: the others, the likeliest
-    first."""
+    """Posterior of a machine.
+
+    Attributes
+    ----------
+    changes
+        Values of the corrected twin.
+    intervals
+        `component.parameter` → 95 % interval of an estimated value, in its unit.
+    probability
+        Posterior probability of the explanation, 0 to 1.
+    alternatives
+        Alternative explanations, the most probable first.
+    """
 
     changes: Changes
     intervals: Mapping[str, tuple[float, float]]
     probability: float
-    otherwise: tuple[Otherwise, ...]
+    alternatives: tuple[Alternative, ...]
 
     def at_best(self, configuration: Configuration) -> Configuration:
-        """The corrected twin."""
+        """Return the configuration of the corrected twin."""
         return override(configuration, self.changes)
 
     def draw(self, configuration: Configuration, random: np.random.Generator) -> Configuration:
-        """A twin as it may be: each value found normal about what was found, either side as wide as
-        its interval, cut off at its bounds."""
+        """Return a configuration with values drawn from their posterior.
+
+        Every estimated value has a split normal distribution about its estimate: its standard
+        deviation on either side is that side of the 95 % interval divided by 1.96. Values stop at
+        the parameter's bounds.
+
+        Parameters
+        ----------
+        configuration
+            Nominal configuration; it is not modified.
+        random
+            Generator of random numbers.
+        """
         configuration = self.at_best(configuration)
         for key, (low, high) in self.intervals.items():
-            there, amount = value_of(configuration, key), random.standard_normal() / NORMAL_95
+            estimate, amount = value_of(configuration, key), random.standard_normal() / NORMAL_95
             configuration = shift_within(
-                configuration, key, amount * (high - there if amount > 0.0 else there - low)
+                configuration, key, amount * (high - estimate if amount > 0.0 else estimate - low)
             )
         return configuration
 
 
 def value_of(configuration: Configuration, key: str) -> float:
-    """The number `group.name`."""
+    """Return the value of a setting. key: `group.name`."""
     group, _, name = key.partition(".")
     return float(getattr(groups(configuration)[group], name))
 
 
 def shift_within(configuration: Configuration, key: str, amount: float) -> Configuration:
-    """The configuration with a number `group.name` higher by an amount, or at the bound next to
-    that."""
+    """Return a configuration with one number shifted, but not beyond its bounds.
+
+    Parameters
+    ----------
+    configuration
+        Configuration to start from; it is not modified.
+    key
+        Setting, `group.name`.
+    amount
+        Increase of the number, in its unit.
+    """
     group, _, name = key.partition(".")
     meaning = fields(type(groups(configuration)[group]))[name]
     assert isinstance(meaning, Quantity)
@@ -81,8 +120,8 @@ def shift_within(configuration: Configuration, key: str, amount: float) -> Confi
 
 
 def format_toml(posterior: Posterior) -> list[str]:
-    """The table's lines in TOML. Full precision, so that a twin read again is the same to the
-    bit."""
+    """Return the lines of the table `posterior` in TOML."""
+    # repr() keeps all digits, so that a twin read again is identical to the bit.
     lines = [
         f"[{POSTERIOR}]",
         f"probability = {posterior.probability!r}",
@@ -90,46 +129,47 @@ def format_toml(posterior: Posterior) -> list[str]:
         f"[{POSTERIOR}.intervals]",
     ]
     lines += [f'"{key}" = [{low!r}, {high!r}]' for key, (low, high) in posterior.intervals.items()]
-    for other in posterior.otherwise:
+    for alternative in posterior.alternatives:
         lines += [
             "",
             f"[[{POSTERIOR}.otherwise]]",
-            f'effect = "{other.effect}"',
-            f"probability = {other.probability!r}",
+            f'effect = "{alternative.effect}"',
+            f"probability = {alternative.probability!r}",
         ]
         lines += [
             f"changes.{group}.{name} = {value!r}"
-            for group, own in other.changes.items()
-            for name, value in own.items()
+            for group, values in alternative.changes.items()
+            for name, value in values.items()
         ]
     return lines
 
 
 def load_posterior(path: Path, base: Configuration | None = None) -> Posterior:
-    """A calibrated twin. Without a table `posterior` its values are taken as certain.
+    """Return the posterior in a calibrated twin's file.
 
     Parameters
     ----------
     path
-        Its file.
+        File of the calibrated twin. Without a table `posterior`, its values count as certain.
     base
-        The machine's settings as described; the suspension rig's by default.
+        Described settings of the machine. Defaults to those of the suspension rig.
 
     Returns
     -------
     Posterior
-        What is known of it.
+        Corrected values, their intervals and the alternative explanations.
 
     Raises
     ------
     RigtwinError
-        Naming file and fault.
+        If the file cannot be read or has a mistake. The message names the file.
     """
     nominal = Configuration() if base is None else base
     return read_toml(path, lambda tables: _parse(tables, nominal))
 
 
 def _parse(tables: Mapping[str, Any], nominal: Configuration) -> Posterior:
+    """Return the posterior in the tables of a calibrated twin's file."""
     changes = values_of(tables)
     configuration = _with(nominal, "it", changes)
     table = tables.get(POSTERIOR, {})
@@ -142,24 +182,26 @@ def _parse(tables: Mapping[str, Any], nominal: Configuration) -> Posterior:
             raise RigtwinError(
                 f"unknown {POSTERIOR}.{key}; there are probability, intervals, otherwise"
             )
-    intervals, others = table.get("intervals", {}), table.get("otherwise", [])
+    intervals, alternatives = table.get("intervals", {}), table.get("otherwise", [])
     if not isinstance(intervals, Mapping):
         raise RigtwinError(
             f"{POSTERIOR}.intervals = {intervals!r}: expected a "
             "table of component.parameter = [low, high]"
         )
-    if not isinstance(others, list) or not all(isinstance(other, Mapping) for other in others):
+    if not isinstance(alternatives, list) or not all(
+        isinstance(alternative, Mapping) for alternative in alternatives
+    ):
         raise RigtwinError(f"{POSTERIOR}.otherwise: expected tables, [[{POSTERIOR}.otherwise]]")
     return Posterior(
         changes,
         {key: _interval(configuration, key, ends) for key, ends in intervals.items()},
         _probability(table.get("probability", 1.0)),
-        tuple(_otherwise(other, nominal) for other in others),
+        tuple(_alternative(alternative, nominal) for alternative in alternatives),
     )
 
 
 def _with(nominal: Configuration, where: str, changes: Changes) -> Configuration:
-    """A machine with changes, which must be of its components alone."""
+    """Return a configuration with changes, which may concern components alone."""
     configuration = override(nominal, changes)
     for group in changes:
         if group not in configuration.plant._fields:
@@ -171,12 +213,14 @@ def _with(nominal: Configuration, where: str, changes: Changes) -> Configuration
 
 
 def _probability(value: object) -> float:
+    """Return a probability; raise RigtwinError for any other value."""
     if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 <= value <= 1.0:
         raise RigtwinError(f"{POSTERIOR}: probability = {value!r}; expected 0 to 1")
     return float(value)
 
 
 def _interval(configuration: Configuration, key: str, ends: object) -> tuple[float, float]:
+    """Return the interval of a parameter, which must contain the parameter's value."""
     group, _, name = key.partition(".")
     known = (
         fields(type(getattr(configuration.plant, group)))
@@ -195,15 +239,16 @@ def _interval(configuration: Configuration, key: str, ends: object) -> tuple[flo
     if not (
         math.isfinite(low) and math.isfinite(high) and low <= value_of(configuration, key) <= high
     ):
-        there = value_of(configuration, key)
+        estimate = value_of(configuration, key)
         raise RigtwinError(
             f"{POSTERIOR}.intervals: {key} = {ends!r}; expected "
-            f"[low, high] about its value, {there:g}"
+            f"[low, high] about its value, {estimate:g}"
         )
     return low, high
 
 
-def _otherwise(table: Mapping[str, Any], nominal: Configuration) -> Otherwise:
+def _alternative(table: Mapping[str, Any], nominal: Configuration) -> Alternative:
+    """Return the alternative explanation in a table `[[posterior.otherwise]]`."""
     changes = table.get("changes", {})
     if not isinstance(table.get("effect"), str) or not isinstance(changes, Mapping):
         raise RigtwinError(
@@ -211,9 +256,10 @@ def _otherwise(table: Mapping[str, Any], nominal: Configuration) -> Otherwise:
             f"changes, found {', '.join(table) or 'nothing'}"
         )
     effect = str(table["effect"])
+    # The name is printed in tables and messages of one line.
     if not effect.isprintable():
         raise RigtwinError(
             f"{POSTERIOR}.otherwise: effect = {effect!r}; expected a name of one line"
         )
     _with(nominal, f"{POSTERIOR}.otherwise {effect}", changes)
-    return Otherwise(effect, _probability(table.get("probability", 0.0)), changes)
+    return Alternative(effect, _probability(table.get("probability", 0.0)), changes)

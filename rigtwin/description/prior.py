@@ -1,7 +1,7 @@
-"""What is believed of a machine's nominal values before any data are seen.
+"""Prior belief in a machine's nominal values, before any data are seen.
 
-`nominal = "known"` or `"rough"` in a description chooses one of these priors. Everything after that
-reads their numbers, so that one method judges every machine.
+`nominal = "known"` or `"rough"` in a description chooses one of these priors. A diagnosis reads
+their numbers alone, so that one method judges every machine.
 """
 
 from __future__ import annotations

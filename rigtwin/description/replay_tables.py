@@ -1,4 +1,4 @@
-"""The replays of a description: which joint each is about, what moves it, and what is observed."""
+"""Reader of a description's replays: moved joint, moving components and observed signals."""
 
 from __future__ import annotations
 
@@ -10,17 +10,19 @@ from rigtwin.description.control import Control, FormulaControl
 from rigtwin.description.joined_replays import JoinedReplays
 from rigtwin.description.machine import Joint, ReplayOf, Row
 from rigtwin.description.mechanism import Mechanism
-from rigtwin.description.mistakes import Mistakes, near
+from rigtwin.description.mistakes import Mistakes, suggest
 from rigtwin.description.physics import Physics
 from rigtwin.description.tolerance import Tolerance
 from rigtwin.errors import RigtwinError
 
 TICKS_LATE = 0.5
-"""Tolerance of the time of a sample, ticks."""
+"""Default tolerance of the sampling time of a signal, ticks."""
+NO_JOINT = Joint("", False, 0.0, (-1.0, 1.0), (0.0, 0.0), 0.0)
+"""Joint of a replay that covers a whole machine."""
 
 
 class Replays:
-    """Reads the replays of a machine whose components and controller are known."""
+    """Reader of a machine's replays; its components and controller are read before."""
 
     def __init__(
         self,
@@ -36,11 +38,18 @@ class Replays:
             mistakes,
         )
 
-    def read(self, given: object) -> tuple[ReplayOf, ...]:
+    def read(self, tables: object) -> tuple[ReplayOf, ...]:
+        """Return the replays without mistakes; note the mistakes of the rest.
+
+        Parameters
+        ----------
+        tables
+            Value of `replays` in the description; a list of tables is expected.
+        """
         if (
-            not isinstance(given, list)
-            or not given
-            or not all(isinstance(each, Mapping) for each in given)
+            not isinstance(tables, list)
+            or not tables
+            or not all(isinstance(table, Mapping) for table in tables)
         ):
             self._mistakes.note(
                 "",
@@ -48,19 +57,40 @@ class Replays:
                 "moves the joint and what is observed",
             )
             return ()
-        found = []
-        for number, table in enumerate(given, start=1):
+        replays = []
+        for number, table in enumerate(tables, start=1):
             replay = self._replay(f"[[replays]] {table.get('name', number)}", table, number)
             if replay is not None:
-                found.append(replay)
-        names = [row.name for replay in found for row in replay.rows]
+                replays.append(replay)
+        # A signal that is observed twice would count twice in the likelihood.
+        names = [row.name for replay in replays for row in replay.rows]
         for name in dict.fromkeys(name for name in names if names.count(name) > 1):
             self._mistakes.note("[[replays]]", f"{name} is observed by two replays; expected one")
-        return tuple(found)
+        return tuple(replays)
 
     def _replay(self, where: str, table: Mapping[str, Any], number: int) -> ReplayOf | None:
+        """Return the replay of one table, or None if it has mistakes, which are noted."""
         before = len(self._mistakes)
         self._mistakes.unknown(where, table, ("name", "moved_by", "observe", "band", "free"))
+        movers = self._read_movers(where, table)
+        rows = [
+            row
+            for name in self._read_observed(where, table)
+            if (row := self._row(where, name, movers)) is not None
+        ]
+        # The checks below look up movers and rows, so they need both without mistakes.
+        if len(self._mistakes) > before:
+            return None
+        name = str(table.get("name", f"replay {number}"))
+        coupled = "free" in table or len(movers) > 1
+        if coupled and not self._components.physics().replayed_whole:
+            joined = JoinedReplays(self._mechanism, self._components, self._mistakes)
+            read = joined.read_coupled if "free" in table else joined.read_moved
+            return read(where, name, table, movers, rows)
+        return self._single_replay(where, name, table, movers, rows)
+
+    def _read_movers(self, where: str, table: Mapping[str, Any]) -> list[str]:
+        """Return the components that move a replay; note names that are none."""
         movers = table.get("moved_by", [])
         movers = [movers] if isinstance(movers, str) else movers
         known = [
@@ -69,86 +99,63 @@ class Replays:
             if kind in MOVING or SENSED.get(kind) in ("position", "velocity")
         ]
         if not isinstance(movers, list) or not movers:
-            said = "is missing" if "moved_by" not in table else "is no name"
-            there = ", ".join(known) or "there is none"
+            problem = "is missing" if "moved_by" not in table else "is no name"
+            names = ", ".join(known) or "there is none"
             self._mistakes.note(
                 where,
-                f"moved_by {said}; expected an actuator or a sensor of the motion: {there}",
+                f"moved_by {problem}; expected an actuator or a sensor of the motion: {names}",
             )
-            movers = []
+            return []
         for mover in dict.fromkeys(map(str, movers)):
             if movers.count(mover) > 1:
-                self._mistakes.note(where, f"moved_by: {mover} stands there twice")
+                self._mistakes.note(where, f"moved_by: {mover} is listed twice")
         for mover in movers:
             if mover not in known:
                 self._mistakes.note(
                     where,
                     f"moved_by {mover!r} is no actuator or sensor "
-                    f"of the motion; {near(mover, known)}",
+                    f"of the motion; {suggest(mover, known)}",
                 )
-        rows = [
-            row
-            for name in self._read_observed(where, table)
-            if (row := self._row(where, name, movers)) is not None
-        ]
-        if len(self._mistakes) > before:
-            return None
-        quarter_car = self._components.physics().replayed_whole
-        joint_name = "" if quarter_car else self._components.found[movers[0]].joint
-        name = str(table.get("name", f"replay {number}"))
-        if not quarter_car and ("free" in table or len(movers) > 1):
-            joined = JoinedReplays(self._mechanism, self._components, self._mistakes)
-            read = joined.read_coupled if "free" in table else joined.read_moved
-            return read(where, name, table, movers, rows)
+        return movers
+
+    def _single_replay(
+        self, where: str, name: str, table: Mapping[str, Any], movers: list[str], rows: list[Row]
+    ) -> ReplayOf | None:
+        """Return the replay of one joint, or of a machine that is replayed as a whole."""
+        whole = self._components.physics().replayed_whole
+        joint_name = "" if whole else self._components.by_name[movers[0]].joint
         if "band" in table:
             self._mistakes.note(
                 where, "band is for joints that move together; this replay moves one"
             )
-        if not joint_name and not quarter_car:
+        if not joint_name and not whole:
             self._mistakes.note(
                 where, f"{movers[0]} acts on no joint of its own; expected one that does"
             )
             return None
         try:
-            joint = (
-                self._mechanism.joint(joint_name)
-                if joint_name
-                else Joint("", False, 0.0, (-1.0, 1.0), (0.0, 0.0), 0.0)
-            )
+            joint = self._mechanism.joint(joint_name) if joint_name else NO_JOINT
         except RigtwinError as error:
             self._mistakes.note(where, str(error))
             return None
-        at = {
-            kind: [
-                n
-                for n, t in self._components.types.items()
-                if t == kind and self._components.found[n].joint == joint_name
-            ]
-            for kind in ("mass", "guide", "rotor")
-        }
-        for kind, names in at.items():
-            if len(names) > 1:
-                self._mistakes.note(
-                    where,
-                    f"joint {joint_name} has {len(names)} components of type {kind}; expected one",
-                )
-        if not quarter_car:
+        parts = self._parts_of(where, joint_name)
+        if not whole:
             for row in rows:
-                other = self._components.found.get(row.name)
-                if other is not None and other.joint != joint_name:
+                sensor = self._components.by_name.get(row.name)
+                if sensor is not None and sensor.joint != joint_name:
                     self._mistakes.note(
                         where,
-                        f"{row.name} is of joint {other.joint or 'none'}, "
+                        f"{row.name} is of joint {sensor.joint or 'none'}, "
                         f"{movers[0]} moves {joint_name}",
                     )
-        closed = self._closes(movers[0])
-        if self._components.types[movers[0]] in PUSHING and not at["mass"]:
+        # Forward dynamics need the mass and the friction of the pushed joint.
+        if self._components.types[movers[0]] in PUSHING and not parts["mass"]:
             self._mistakes.note(
                 where,
                 f"{movers[0]} pushes joint {joint_name}, whose mass "
                 "is no component; add one of type mass",
             )
-        if self._components.types[movers[0]] in PUSHING and not at["guide"]:
+        if self._components.types[movers[0]] in PUSHING and not parts["guide"]:
             self._mistakes.note(
                 where,
                 f"{movers[0]} pushes joint {joint_name}, which "
@@ -159,11 +166,28 @@ class Replays:
             joint=joint,
             moved_by=tuple(movers),
             rows=tuple(rows),
-            guide=at["guide"][0] if at["guide"] else None,
-            mass=at["mass"][0] if at["mass"] else None,
-            closed=closed,
-            rotor=at["rotor"][0] if at["rotor"] else None,
+            guide=parts["guide"],
+            mass=parts["mass"],
+            closed=self._closes(movers[0]),
+            rotor=parts["rotor"],
         )
+
+    def _parts_of(self, where: str, joint: str) -> dict[str, str | None]:
+        """Return type → component of a joint's mass, guide and rotor; note several of one type."""
+        parts: dict[str, str | None] = {}
+        for kind in ("mass", "guide", "rotor"):
+            names = [
+                name
+                for name, known in self._components.types.items()
+                if known == kind and self._components.by_name[name].joint == joint
+            ]
+            if len(names) > 1:
+                self._mistakes.note(
+                    where,
+                    f"joint {joint} has {len(names)} components of type {kind}; expected one",
+                )
+            parts[kind] = names[0] if names else None
+        return parts
 
     def physics(self, replays: tuple[ReplayOf, ...]) -> Physics:
         """Return the physics of the machine; note components that do not fit it."""
@@ -177,7 +201,7 @@ class Replays:
                 "its joints act on each other; expected no replay beside it",
             )
         if not together and any(
-            component.element == "tendon" for component in self._components.found.values()
+            component.element == "tendon" for component in self._components.by_name.values()
         ):
             self._mistakes.note(
                 "[components]",
@@ -193,28 +217,31 @@ class Replays:
         return physics
 
     def _closes(self, mover: str) -> bool:
-        """Whether the described controller commands it, and can be run along."""
-        control, channel = self._control, self._components.found[mover].channel
+        """Return whether the described controller commands a component, so that it is simulated."""
+        control, channel = self._control, self._components.by_name[mover].channel
         return isinstance(control, FormulaControl) and channel == ("/command", control.output)
 
     def _read_observed(self, where: str, table: Mapping[str, Any]) -> list[str]:
+        """Return the names of the observed signals; an empty list for anything but texts."""
         observed = table.get("observe", [])
         if (
             not isinstance(observed, list)
             or not observed
-            or not all(isinstance(each, str) for each in observed)
+            or not all(isinstance(name, str) for name in observed)
         ):
-            said = "is missing" if "observe" not in table else f"= {str(observed)[:40]!r}"
+            problem = "is missing" if "observe" not in table else f"= {str(observed)[:40]!r}"
             self._mistakes.note(
-                where, f"observe {said}; expected a list of sensors, or of the controller's command"
+                where,
+                f"observe {problem}; expected a list of sensors, or of the controller's command",
             )
             return []
         return observed
 
     def _row(self, where: str, name: str, movers: list[str]) -> Row | None:
+        """Return the observed signal of a sensor or a controller's command; None for any other."""
         control = self._control
-        known = self._components.found.get(name)
-        sensors = [each for each, kind in self._components.types.items() if kind in SENSED]
+        known = self._components.by_name.get(name)
+        sensors = [sensor for sensor, kind in self._components.types.items() if kind in SENSED]
         if (
             known is not None
             and self._components.types[name] in SENSED
@@ -228,28 +255,29 @@ class Replays:
             return Row(name, SENSED[self._components.types[name]], known.channel, known.unit)
         if control is not None and name in control.outputs:
             unit = next(
-                c.unit for c in self._components.found.values() if c.channel == ("/command", name)
+                c.unit for c in self._components.by_name.values() if c.channel == ("/command", name)
             )
             return Row(name, "command", ("/command", name), unit or "1")
-        there = [*sensors, *(control.outputs if control else ())]
+        observable = [*sensors, *(control.outputs if control else ())]
         self._mistakes.note(
-            where, f"observe: {name!r} is no sensor or controller's command; {near(name, there)}"
+            where,
+            f"observe: {name!r} is no sensor or controller's command; {suggest(name, observable)}",
         )
         return None
 
     def tolerate_timing(self, replays: tuple[ReplayOf, ...]) -> None:
-        """Declare how well the time of a sample is known, in ticks of the recording.
+        """Declare a tolerance of the sampling time of every observed sensor, in ticks.
 
-        Forces that are compared with those that a measured motion takes may be held or averaged
-        over a tick. What answers to a command is late against that command, so that one tolerance
-        for each sensor is enough.
+        A recorded force may be held or averaged over a tick, compared with the force that the
+        measured motion requires. A response is late against its command. In both cases a delay of
+        the sensor describes the shift, so that one tolerance per sensor is enough.
         """
-        declared = {(each.group, each.parameter) for each in self._components.tolerances}
+        declared = {(known.group, known.parameter) for known in self._components.tolerances}
         for replay in replays:
-            # Of joints that move together only what is observed is timed: against all of them.
+            # Coupled joints: observed sensors are timed against all prescribed motions at once.
             longest = self._components.physics(replays).longest_delay
             for name in (row.name for row in replay.rows if row.kind != "command"):
-                # What is in one loop with the controller was sampled with it.
+                # A sensor inside a simulated loop is sampled together with the controller.
                 if (name, "delay") not in declared and not replay.closed:
                     self._components.tolerances.append(
                         Tolerance(name, "delay", TICKS_LATE, ticks=True, longest=longest)

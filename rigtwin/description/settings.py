@@ -1,5 +1,4 @@
-"""Groups of settings that a test has beside its plant and controller: safety limits, clocks, a
-road."""
+"""Groups of settings besides the plant and the controller: safety limits, timing and the road."""
 
 from __future__ import annotations
 
@@ -11,8 +10,10 @@ from rigtwin.components.quantity import Quantity
 
 
 class Safety(NamedTuple):
-    """Limits that end a test, on raw measurements and on commands; how a session starts and
-    stops."""
+    """Limits of raw measurements and commands that end a test, and the ramps of a session.
+
+    The source of a field states its meaning and how the value was chosen.
+    """
 
     structure: Annotated[float, Quantity("m", 1e-3, 10.0, "trip of the lab: |structure_lvdt|")] = (
         0.15
@@ -72,7 +73,7 @@ class Safety(NamedTuple):
 
 
 class Timing(NamedTuple):
-    """Clocks of a test."""
+    """Duration, control period and integration step of a test."""
 
     duration: Annotated[float, Quantity("s", 0.01, 86_400.0, "the experiment")] = 20.0
     period: Annotated[float, Quantity("s", 1e-4, 0.1, "1 kHz, assumed")] = 1e-3
@@ -82,7 +83,8 @@ class Timing(NamedTuple):
 
 
 class Road(NamedTuple):
-    """Pseudo-random road: spectral density roughness / wavenumber^exponent, thesis Eq. 6.3."""
+    """Pseudo-random road with the spectral density S(n) = roughness / n^exponent of its wavenumber
+    n, thesis Eq. 6.3; `lowest`, `highest` and `spacing` are the excited frequencies at `speed`."""
 
     roughness: Annotated[
         float, Quantity("m^2/(cycle/m)", 0.0, 1e-2, "motorway, thesis Eq. 6.3")
@@ -97,47 +99,51 @@ class Road(NamedTuple):
 
 
 class Nothing(NamedTuple):
-    """A group of settings that a machine does not have."""
+    """Group without settings, in the place of one that a machine lacks."""
 
 
 def settings_of(values: Mapping[str, float], source: str) -> tuple[float, ...]:
-    """Numbers by name as a group of settings.
+    """Return numbers as a group of settings without bounds.
 
     Parameters
     ----------
     values
         Name → number.
     source
-        Where they come from, in words.
+        Source of the values, for listings.
 
     Returns
     -------
     tuple
-        A NamedTuple whose fields say that any number is allowed.
+        NamedTuple with a field for every number, whose annotation allows any number.
     """
     meaning = Quantity("1", -1e300, 1e300, source)
     return group_of({name: (value, meaning) for name, value in values.items()})
 
 
 def group_of(values: Mapping[str, tuple[float, Quantity]]) -> tuple[float, ...]:
-    """Numbers by name, each with what it means, as a group of settings.
+    """Return numbers with their quantities as a group of settings.
 
     Parameters
     ----------
     values
-        Name → number and meaning.
+        Name → number and quantity.
 
     Returns
     -------
     tuple
-        A NamedTuple, which other processes can be given.
+        NamedTuple with an annotated field for every number. It can be pickled.
     """
     nominal = [value for value, _ in values.values()]
-    made = namedtuple("Settings", list(values), defaults=nominal)  # type: ignore[misc]
+    group_type = namedtuple("Settings", list(values), defaults=nominal)  # type: ignore[misc]
     meanings = {name: meaning for name, (_, meaning) in values.items()}
-    made.__annotations__ = {name: Annotated[float, each] for name, each in meanings.items()}
-    made.__reduce__ = lambda group: (  # type: ignore[method-assign, assignment]
+    group_type.__annotations__ = {
+        name: Annotated[float, meaning] for name, meaning in meanings.items()
+    }
+    # A class made at run time cannot be imported by a worker process, so a pickle holds the values
+    # and makes the class again.
+    group_type.__reduce__ = lambda group: (  # type: ignore[method-assign, assignment]
         group_of,
         ({name: (value, meanings[name]) for name, value in group._asdict().items()},),
     )
-    return made()
+    return group_type()

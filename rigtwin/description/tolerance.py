@@ -1,5 +1,5 @@
-"""What a machine may differ in without anything being wrong: every tolerance is a nuisance to a
-diagnosis, never a finding."""
+"""Tolerances: deviations from the nominal values without a defect. A diagnosis fits them as
+nuisance parameters and never reports them as findings."""
 
 from __future__ import annotations
 
@@ -9,13 +9,29 @@ from dataclasses import dataclass
 from rigtwin.components.plant import P, Plant
 
 MECHANICAL = ("mass", "stiffness", "constant", "coulomb", "viscous")
-"""Parameters that change the motion itself, and not only when or how it is sensed."""
+"""Parameters that change the motion itself, and not only its measurement."""
 
 
 @dataclass(frozen=True)
 class Tolerance:
-    """A declared tolerance of one parameter. group: the component; half_width: in the parameter's
-    unit, or as a share of its value if relative, or in ticks, but no more than `longest`, s."""
+    """Declared tolerance of one parameter.
+
+    Attributes
+    ----------
+    group
+        Name of the component.
+    parameter
+        Name of the parameter.
+    half_width
+        Half width of the tolerance: in the parameter's unit, as a share of the nominal value, or
+        in ticks.
+    relative
+        Whether the half width is a share of the nominal value.
+    ticks
+        Whether the half width is in ticks of the recording.
+    longest
+        Upper bound of a half width in ticks, s.
+    """
 
     group: str
     parameter: str
@@ -25,7 +41,15 @@ class Tolerance:
     longest: float = math.inf
 
     def width(self, plant: Plant, period: float = 1.0) -> float:
-        """Its half width in the parameter's unit, at that plant. period: s, of a tick."""
+        """Return the half width in the parameter's unit.
+
+        Parameters
+        ----------
+        plant
+            Plant with the nominal value, which a relative tolerance refers to.
+        period
+            Period of a tick, s.
+        """
         if self.ticks:
             return min(self.half_width * period, self.longest)
         return self.half_width * (
@@ -35,11 +59,12 @@ class Tolerance:
         )
 
     def shift(self, plant: P, amount: float) -> P:
-        """The plant with this parameter higher by that much, in its unit."""
+        """Return a plant with the parameter increased by an amount, in the parameter's unit."""
         group = getattr(plant, self.group)
         value = float(getattr(group, self.parameter)) + amount
         return plant._replace(**{self.group: group._replace(**{self.parameter: value})})
 
     @property
     def mechanical(self) -> bool:
+        """Whether the parameter changes the motion itself, and not only its measurement."""
         return self.parameter in MECHANICAL

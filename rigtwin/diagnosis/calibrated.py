@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from rigtwin.components.effect import GROUPS
 from rigtwin.components.plant import Plant
 from rigtwin.description.configuration import Configuration, flatten
-from rigtwin.description.posterior import Otherwise, Posterior, format_toml
+from rigtwin.description.posterior import Alternative, Posterior, format_toml
 from rigtwin.description.settings import Nothing
 from rigtwin.diagnosis.finding import Finding
 from rigtwin.diagnosis.fit import Fit
@@ -101,14 +101,14 @@ def _posterior(diagnosis: Diagnosis) -> Posterior:
     )
 
 
-def _alternative(fit: Fit, probability: float) -> Otherwise:
+def _alternative(fit: Fit, probability: float) -> Alternative:
     """Other explanation as changes of the plant, by component."""
     changes: dict[str, dict[str, object]] = {}
     for effect, values in zip(fit.effects, fit.values, strict=True):
         changes.setdefault(effect.group, {}).update(
             zip(effect.kind.parameters, values, strict=True)
         )
-    return Otherwise(fit.name, probability, changes)
+    return Alternative(fit.name, probability, changes)
 
 
 def _describe_setting(effect: Finding) -> str:

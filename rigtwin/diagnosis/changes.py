@@ -203,7 +203,7 @@ def _with_trends(
         return parameter
     values = np.array([interval.value for interval in parameter.values])
     half_widths = np.array([0.5 * (interval.high - interval.low) for interval in parameter.values])
-    # The fit weighs by standard errors, of which an interval spans `interval_half_width` to either side.
+    # The fit weighs by standard errors, `interval_half_width` to each side.
     trends = fit_trends(
         values, half_widths / thresholds.interval_half_width, covariates, float(BLOCKS - 1)
     )

@@ -71,7 +71,7 @@ def _pose(
             data.qpos[place[joint]] = values[tick] if np.isfinite(values[tick]) else 0.0
         for tie, at in zip(ties, led, strict=True):
             to = int(model.jnt_qposadr[mechanism.number("joint", tie.to)])
-            data.qpos[at] = tie.apart + tie.ratio * data.qpos[to]
+            data.qpos[at] = tie.offset + tie.ratio * data.qpos[to]
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
         mujoco.mj_collision(model, data)

@@ -14,6 +14,7 @@ from rigtwin.diagnosis.evidence import Evidence, relative_errors
 from rigtwin.diagnosis.explain import Explanation
 from rigtwin.diagnosis.finding import Estimate, Finding, Name, Nearest, Rival, Unobservable
 from rigtwin.diagnosis.fit import Fit
+from rigtwin.diagnosis.posterior import HypothesisPosterior
 from rigtwin.diagnosis.sampling import SensorProperty
 from rigtwin.diagnosis.support import Support
 from rigtwin.diagnosis.text import format_distinct

@@ -57,25 +57,27 @@ def expand(columns: Mapping[str, Any], labels: Mapping[str, Sequence[str]]) -> E
     Expansion
         Columns of numbers, and the columns that have no clear meaning as numbers.
     """
-    found = Expansion()
+    expansion = Expansion()
     for name, column in columns.items():
-        _expand(name, column, labels, found)
-    return found
+        _expand(name, column, labels, expansion)
+    return expansion
 
 
-def _expand(name: str, column: Any, labels: Mapping[str, Sequence[str]], found: Expansion) -> None:
+def _expand(
+    name: str, column: Any, labels: Mapping[str, Sequence[str]], expansion: Expansion
+) -> None:
     import pyarrow
     from pyarrow import types
 
     kind = column.type
     if types.is_dictionary(kind):
-        _expand(name, column.cast(kind.value_type), labels, found)
+        _expand(name, column.cast(kind.value_type), labels, expansion)
     elif isinstance(kind, pyarrow.BaseExtensionType):
-        _expand(name, column.cast(kind.storage_type), labels, found)
+        _expand(name, column.cast(kind.storage_type), labels, expansion)
     elif types.is_struct(kind):
         for place in range(kind.num_fields):
             part = kind.field(place).name
-            _expand(f"{name}.{part}", _field_of(column, place), labels, found)
+            _expand(f"{name}.{part}", _field_of(column, place), labels, expansion)
     elif (
         types.is_list(kind)
         or types.is_large_list(kind)
@@ -83,14 +85,14 @@ def _expand(name: str, column: Any, labels: Mapping[str, Sequence[str]], found: 
         or types.is_list_view(kind)
         or types.is_large_list_view(kind)
     ):
-        _expand_lists(name, column, labels, found)
+        _expand_lists(name, column, labels, expansion)
     elif types.is_string(kind) or types.is_large_string(kind) or types.is_string_view(kind):
-        _read_texts(name, column, found)
+        _read_texts(name, column, expansion)
     elif (convert := _converter(kind)) is not None:
-        found.values[name], unit = convert(column)
-        found.units |= {name: unit} if unit else {}
+        expansion.values[name], unit = convert(column)
+        expansion.units |= {name: unit} if unit else {}
     else:
-        found.refused[name] = f"it holds {kind}, which is no number"
+        expansion.refused[name] = f"it holds {kind}, which is no number"
 
 
 def _field_of(column: Any, place: int) -> Any:
@@ -140,32 +142,32 @@ def _floats(column: Any) -> Array:
 
 
 def _expand_lists(
-    name: str, column: Any, labels: Mapping[str, Sequence[str]], found: Expansion
+    name: str, column: Any, labels: Mapping[str, Sequence[str]], expansion: Expansion
 ) -> None:
     """Expand lists of one length to a column an item."""
     from pyarrow import chunked_array, compute
 
     if not len(column):
-        found.refused[name] = "it holds no rows"
+        expansion.refused[name] = "it holds no rows"
         return
     if column.null_count:
         row = int(np.argmax(column.is_null().to_numpy())) + 1
-        found.refused[name] = f"it holds no list in row {row}"
+        expansion.refused[name] = f"it holds no list in row {row}"
         return
     lengths = compute.list_value_length(column)  # type: ignore[attr-defined]
     least, most = (value.as_py() for value in compute.min_max(lengths).values())  # type: ignore[attr-defined]
     if least != most:
-        found.refused[name] = f"it holds lists of {least} to {most} values; expected one length"
+        expansion.refused[name] = f"it holds lists of {least} to {most} values; expected one length"
         return
     if most > MOST_ITEMS:
-        found.refused[name] = f"it holds lists of {most} values; expected at most {MOST_ITEMS}"
+        expansion.refused[name] = f"it holds lists of {most} values; expected at most {MOST_ITEMS}"
         return
     # All items one after another; flatten heeds offsets of slices.
     flat = chunked_array([chunk.flatten() for chunk in column.chunks], column.type.value_type)
     inner = Expansion()
     _expand("", flat, {}, inner)
     if inner.refused and not inner.values:
-        found.refused[name] = next(iter(inner.refused.values()))
+        expansion.refused[name] = next(iter(inner.refused.values()))
         return
     for part, numbers in inner.values.items():
         if len(numbers) != len(column) * most:
@@ -173,16 +175,16 @@ def _expand_lists(
         rows = numbers.reshape(len(column), most)
         for place, item in enumerate(name_items(name, most, labels.get(name, ()))):
             # A list of lists or of structures: `name[0][1]`, `name[0].field`.
-            found.values[f"{item}{part}"] = np.ascontiguousarray(rows[:, place])
+            expansion.values[f"{item}{part}"] = np.ascontiguousarray(rows[:, place])
 
 
-def _read_texts(name: str, column: Any, found: Expansion) -> None:
+def _read_texts(name: str, column: Any, expansion: Expansion) -> None:
     """Read texts that spell numbers, times of day or dates."""
     cells = ["" if cell is None else cell for cell in column.to_pylist()]
     numbers, wrong = numbers_of(cells, ".")
     if not np.isfinite(numbers).any():
-        found.refused[name] = "it holds text"
+        expansion.refused[name] = "it holds text"
         return
-    found.values[name] = numbers
+    expansion.values[name] = numbers
     if wrong is not None:
-        found.wrong[name] = f"{cells[wrong][:40]!r} in row {wrong + 1}"
+        expansion.wrong[name] = f"{cells[wrong][:40]!r} in row {wrong + 1}"

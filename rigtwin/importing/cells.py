@@ -105,7 +105,7 @@ class Rows:
     numbers
         Number of each row's line.
     notes
-        What was odd in the rows, a line each.
+        Irregularities of the rows, one line per irregularity.
     """
 
     columns: dict[int, ColumnBuilder]
@@ -148,18 +148,18 @@ def gather_rows(
     RigtwinError
         If a row has numbers beyond its last column.
     """
-    found = Rows({place: ColumnBuilder(decimal) for place in places})
-    builders = list(found.columns.items())
+    rows = Rows({place: ColumnBuilder(decimal) for place in places})
+    builders = list(rows.columns.items())
     short: list[int] = []
     long: list[int] = []
     # A row is added when the next one comes, as the last one may break off.
     waiting: tuple[int, list[str]] | None = None
 
     def add(number: int, cells: list[str]) -> None:
-        found.numbers.append(number)
+        rows.numbers.append(number)
         for place, builder in builders:
             builder.cells.append(cells[place].strip() if place < len(cells) else "")
-        if len(found.numbers) % BLOCK == 0:
+        if len(rows.numbers) % BLOCK == 0:
             for _, builder in builders:
                 builder.end_block()
 
@@ -181,18 +181,18 @@ def gather_rows(
         waiting = number, cells
     if waiting is not None:
         if short and short[-1] == waiting[0]:
-            found.notes.append(f"the last line, {short.pop()}, breaks off and is left out")
+            rows.notes.append(f"the last line, {short.pop()}, breaks off and is left out")
         else:
             add(*waiting)
     if short:
-        found.notes.append(
+        rows.notes.append(
             f"{len(short)} lines break off, the first is {short[0]}; cells are missing"
         )
     if long:
-        found.notes.append(
+        rows.notes.append(
             f"{len(long)} lines have words after their last cell, the first is {long[0]}"
         )
-    return found
+    return rows
 
 
 def raw_cells(line: str, separator: str) -> list[str]:

@@ -26,9 +26,9 @@ class Columns:
     units
         Name → unit as the file spells it.
     form
-        How the file was read, for people.
+        Format of the file as it was read, for people.
     notes
-        What was odd in the file, a line each.
+        Irregularities of the file, one line per irregularity.
     wrong
         Name → first cell that should be a number and is none, and where it stands.
     listed
@@ -60,23 +60,25 @@ class Columns:
 
 
 def is_missing(cell: str) -> bool:
-    """Whether a cell holds no value."""
+    """Return whether a cell holds no value."""
     return cell.strip().lower() in MISSING
 
 
 def number_of(cell: str, decimal: str) -> float:
-    """A cell as a number. Raises ValueError."""
+    """Return the number in a cell. Raises ValueError for any other cell."""
+    # With a decimal comma, dots separate thousands; a cell with a dot alone is ambiguous.
     if decimal == ",":
         if "." in cell and "," not in cell:
             raise ValueError(cell)
         cell = cell.replace(".", "").replace(",", ".")
+    # float() accepts Python's "1_000", which no measuring program writes as a number.
     if "_" in cell:
         raise ValueError(cell)
     return float(cell)
 
 
 def is_value(cell: str, decimal: str) -> bool:
-    """Whether a cell holds a number, a time, or nothing."""
+    """Return whether a cell holds a number, a date, a time of day, or nothing."""
     if is_missing(cell):
         return True
     try:
@@ -87,14 +89,14 @@ def is_value(cell: str, decimal: str) -> bool:
 
 
 def numbers_of(cells: Sequence[str], decimal: str) -> tuple[Array, int | None]:
-    """A column's cells as numbers; times of day and dates as seconds.
+    """Return a column's cells as numbers; times of day and dates as seconds.
 
     Parameters
     ----------
     cells
-        As they stand in the file.
+        Texts of the cells.
     decimal
-        Its decimal sign.
+        Decimal sign of the file.
 
     Returns
     -------
@@ -122,6 +124,7 @@ def numbers_of(cells: Sequence[str], decimal: str) -> tuple[Array, int | None]:
     out[np.isinf(out)] = np.nan
     if not wrong:
         return out, None
+    # Dates among numbers are errors: a column of stamps has stamps in all of its cells.
     stamps = stamps_of([cells[row] for row in wrong])
     if stamps is None or np.isfinite(out).any():
         return out, wrong[0]
@@ -130,7 +133,7 @@ def numbers_of(cells: Sequence[str], decimal: str) -> tuple[Array, int | None]:
 
 
 def join(tables: Mapping[str, Columns]) -> Columns:
-    """Files side by side, row by row.
+    """Return the columns of several files side by side, row by row.
 
     Parameters
     ----------
@@ -166,10 +169,10 @@ def join(tables: Mapping[str, Columns]) -> Columns:
     listed: list[str] = []
     for file, table in tables.items():
         for name, column in table.values.items():
-            for own in (f"{file}.{name}", *([name] if names.count(name) == 1 else [])):
-                values[own] = column
-                units |= {own: table.units[name]} if name in table.units else {}
-                wrong |= {own: table.wrong[name]} if name in table.wrong else {}
+            for label in (f"{file}.{name}", *([name] if names.count(name) == 1 else [])):
+                values[label] = column
+                units |= {label: table.units[name]} if name in table.units else {}
+                wrong |= {label: table.wrong[name]} if name in table.wrong else {}
         for name in table.names:
             listed += [f"{file}.{name}", *([name] if names.count(name) == 1 else [])]
         for name, reason in table.refused.items():

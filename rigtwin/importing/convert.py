@@ -1,4 +1,4 @@
-"""From files of another program to a recording, saying what was found on the way."""
+"""From files of another program to a recording, with a report of the conversion."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ BLOCK = 10_000
 Data = Any
 """Paths of files, a list; or data in memory."""
 LARGEST = 1e15
-"""What no channel reaches, in SI units."""
+"""Bound on the magnitude of a channel, in SI units."""
 Channels = Mapping[tuple[str, str], Array]
 """(Topic, field) → shape (ticks,)."""
 ENDING = ".mcap"
@@ -60,7 +60,7 @@ class Imported:
     channels
         (Topic, field) → values in SI, shape (ticks,).
     report
-        What was found on the way, a line each.
+        Report of the conversion, one line per remark.
     """
 
     period: float
@@ -78,7 +78,7 @@ class Written:
     path
         File of the recording.
     report
-        What was found on the way, a line each.
+        Report of the conversion, one line per remark.
     """
 
     path: Path
@@ -107,7 +107,7 @@ def convert(
     Returns
     -------
     list of str
-        What was found on the way, a line each.
+        Report of the conversion, one line per remark.
 
     Raises
     ------
@@ -189,7 +189,7 @@ def read_columns(data: Data, selection: Selection = EVERYTHING) -> Columns:
     if not _are_paths(data):
         return read_frame(data, selection)
     if len({path.stem for path in data}) < len(data):
-        raise RigtwinError("two of the files have the same name; rename one, they are told by it")
+        raise RigtwinError("two of the files have the same name; rename one of them")
     return join({path.stem: read(path, selection.of_file(path.stem)) for path in data})
 
 
@@ -319,8 +319,7 @@ def _channels(label: str, columns: Columns, wanted: Map) -> Imported:
 
 
 def _named(columns: Columns, name: str) -> str:
-    """A column's name, also where the map has it as the file's first line does, its unit behind
-    it."""
+    """Return the name of a column, which a map may write with its unit as the file does."""
     if name in columns.values or name in columns.refused:
         return name
     bare, unit = split_unit(name, "")
@@ -338,7 +337,7 @@ def _column(columns: Columns, name: str) -> Array:
 
 
 def _signal(columns: Columns, name: str, asked: Column, report: list[str]) -> Array:
-    """A column in SI, shape (rows,)."""
+    """Return a column in SI, shape (rows,)."""
     values = _column(columns, asked.name)
     said = asked.unit if asked.unit is not None else columns.units.get(asked.name, "1")
     try:
@@ -354,29 +353,29 @@ def _signal(columns: Columns, name: str, asked: Column, report: list[str]) -> Ar
 
 
 def _notes(columns: Columns, inputs: Mapping[str, Column]) -> list[str]:
-    """What people should know of a column's unit, and of its counts."""
-    found = []
+    """Return remarks on the units of columns, and on counters that seem to wrap."""
+    notes = []
     for name, asked in inputs.items():
         said = columns.units.get(asked.name)
         if asked.unit is None and said is None:
-            found.append(f"{name}: no unit is said of column {asked.name!r}; taken as SI")
+            notes.append(f"{name}: no unit is said of column {asked.name!r}; taken as SI")
         if (
             asked.unit is not None
             and said is not None
             and is_unit(said)
             and unit_of(said) != unit_of(asked.unit)
         ):
-            found.append(
+            notes.append(
                 f"{name}: the file says {said} of column {asked.name!r}, the map {asked.unit}; "
                 f"taken as {asked.unit}"
             )
         wrap = looks_wrapped(columns.values[asked.name]) if asked.wrap is None else None
         if wrap is not None:
-            found.append(
+            notes.append(
                 f"{name}: column {asked.name!r} steps from one end of {wrap:.0f} counts to the "
                 f"other; if it begins again there, say wrap = {wrap:.0f} in the map"
             )
-    return found
+    return notes
 
 
 def _times_without_unit(columns: Columns, wanted: Map) -> list[str]:
@@ -427,7 +426,7 @@ def _time(columns: Columns, wanted: Map, signals: Signals) -> Array:
 def _require_numbers(
     columns: Columns, inputs: Mapping[str, Column], time: Array, signals: Signals
 ) -> None:
-    """Raises RigtwinError where a cell held no number."""
+    """Raise RigtwinError where a cell holds no number."""
     for name, values in signals.items():
         wrong = ~np.isfinite(values)
         if wrong.any():
@@ -441,7 +440,7 @@ def _require_numbers(
 
 
 def _values(name: str, source: Source, signals: Signals, time: Array, period: float) -> Array:
-    """A channel, shape (ticks,)."""
+    """Return the values of a channel, shape (ticks,)."""
     if source.constant is not None:
         return np.full(len(time), source.constant)
     with np.errstate(over="ignore"):

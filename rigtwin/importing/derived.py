@@ -1,4 +1,4 @@
-"""Channels that are worked out from columns: counters that wrap around, and formulas."""
+"""Channels computed from columns: unwrapped counters, and formulas."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ from controllers.formula import (
 from rigtwin.numerics.arrays import Array
 
 BETWEEN, WIDEST = 0.005, 3
-"""Share of a counter's range by which samples that were interpolated lie off its end, and how many
-of them stand side by side at most."""
+"""Smallest distance of an interpolated sample from the counter's end, as a share of its range, and
+the largest number of adjacent interpolated samples."""
 
 
-def _divide(one: Array | float, two: Array | float) -> Array | float:
+def _divide(dividend: Array | float, divisor: Array | float) -> Array | float:
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.divide(one, two)
+        return np.divide(dividend, divisor)
 
 
 PLAIN: dict[int, Callable[..., Any]] = {
@@ -50,42 +50,43 @@ PLAIN: dict[int, Callable[..., Any]] = {
     SIGN: np.sign,
     SINE: np.sin,
     COSINE: np.cos,
-    ROOT: lambda one: np.sqrt(np.maximum(one, 0.0)),
+    ROOT: lambda value: np.sqrt(np.maximum(value, 0.0)),
     SMALLER: np.minimum,
     LARGER: np.maximum,
     CLIP: np.clip,
 }
-"""Operation → what it does to whole columns."""
+"""Operation → function of whole columns."""
 OPERANDS = {NEGATE: 1, ABSOLUTE: 1, SIGN: 1, SINE: 1, COSINE: 1, ROOT: 1, CLIP: 3}
-"""How many it takes, where that is not two."""
+"""Operation → number of its operands, unless that is two."""
 
 
 def unwrap(counts: Array, wrap: float) -> tuple[Array, int]:
-    """What a counter of so many counts has counted.
+    """Return the continuous count of a counter that begins again after `wrap` counts.
 
-    Steps of more than half of them are taken for passing the end, and the first sample for a signed
-    one: of 16 bits, 65 528 is −8. A sample between the two ends, where both of its neighbours are
-    at them, was interpolated by whoever wrote the file; it is bridged.
+    A step of more than half the range is a wrap. The first sample is signed: with 16 bits, 65 528
+    is −8. A sample between the two ends whose neighbours lie at opposite ends was interpolated by
+    the program that wrote the file; it is replaced by interpolating the continuous count.
 
     Parameters
     ----------
     counts
-        Shape (rows,).
+        Counter's samples, shape (rows,).
     wrap
-        After how many counts it begins again.
+        Range of the counter, counts.
 
     Returns
     -------
     array
-        Shape (rows,).
+        Continuous count, shape (rows,).
     int
-        How many samples were bridged.
+        Number of replaced samples.
     """
     rows = np.nonzero(np.isfinite(counts))[0]
     if len(rows) < WIDEST + 2:
         return counts, 0
     known = counts[rows]
     sound = np.ones(len(known), bool)
+    # Interpolated samples stand in runs of at most WIDEST. A run is found by the jump across it.
     for width in range(1, WIDEST + 1):
         across = known[width + 1 :] - known[: -width - 1]
         inner = np.lib.stride_tricks.sliding_window_view(known[1:-1], width)
@@ -105,29 +106,29 @@ def unwrap(counts: Array, wrap: float) -> tuple[Array, int]:
 
 
 def _nearest(step: Array, wrap: float) -> Array:
-    """The same step, whole turns less, between minus and plus half a turn."""
+    """Return a step without whole ranges of the counter: between −wrap/2 and wrap/2."""
     return step - wrap * np.round(step / wrap)
 
 
 def evaluate(formula: Formula, columns: Mapping[str, Array], period: float) -> Array:
-    """A formula over whole columns.
+    """Return the values of a formula over whole columns.
 
-    The words are a controller's, but nothing is late here: a derivative and a mean are taken about
-    each row, a low pass goes forth and back.
+    The functions have a controller's names but no phase lag: derivatives and means are centred, and
+    a low pass runs forwards and backwards.
 
     Parameters
     ----------
     formula
-        Of columns and constants.
+        Formula of columns and constants.
     columns
-        Every input that it has, shape (rows,) each.
+        Input of the formula → column, shape (rows,).
     period
-        Of a row, s.
+        Period of the rows, s.
 
     Returns
     -------
     array
-        Shape (rows,).
+        Values, shape (rows,).
     """
     program = formula.program
     rows = len(columns[formula.inputs[0]])
@@ -135,18 +136,19 @@ def evaluate(formula: Formula, columns: Mapping[str, Array], period: float) -> A
     count = len(program.operations)
     registers += program.registers[len(registers) : len(program.registers) - count].tolist()
     for code, *places, _ in program.operations.tolist():
-        given = [registers[place] for place in places]
+        operands = [registers[place] for place in places]
         if code in PLAIN:
-            registers.append(PLAIN[code](*given[: OPERANDS.get(code, 2)]))
+            registers.append(PLAIN[code](*operands[: OPERANDS.get(code, 2)]))
         else:
-            length = float(np.asarray(given[1]).flat[0])
-            registers.append(_remember(code, np.asarray(given[0], float), length, period))
+            length = float(np.asarray(operands[1]).flat[0])
+            registers.append(_remember(code, np.asarray(operands[0], float), length, period))
     return np.broadcast_to(np.asarray(registers[-1], float), (rows,)).copy()
 
 
 def _remember(code: int, signal: Array, length: float, period: float) -> Array | float:
-    """What needs more than a row."""
-    from scipy.ndimage import uniform_filter1d  # Late, as scipy.signal below.
+    """Return the result of an operation with memory, such as a derivative or a low pass."""
+    # Importing scipy.signal takes a second, which only these formulas pay for.
+    from scipy.ndimage import uniform_filter1d
     from scipy.signal import butter, sosfiltfilt
 
     if signal.ndim == 0:
@@ -156,6 +158,7 @@ def _remember(code: int, signal: Array, length: float, period: float) -> Array |
     if code == INTEGRAL:
         return np.concatenate([[0.0], np.cumsum(0.5 * period * (signal[1:] + signal[:-1]))])
     if code == LOW_PASS:
+        # butter() takes the corner as a share of the Nyquist frequency: 1/(2π·T) / (1/(2·period)).
         corner = min(period / (np.pi * max(length, 1e-12)), 0.99)
         return sosfiltfilt(butter(1, corner, output="sos"), signal)
     if code == MEAN:

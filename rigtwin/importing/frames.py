@@ -51,13 +51,13 @@ def read_frame(data: object, selection: Selection) -> Columns:
             listed.append(name)
             continue
         try:
-            found, unit = _numbers(name, column, wrong)
+            numbers, unit = _numbers(name, column, wrong)
         except (TypeError, ValueError) as error:
             refused[name] = str(error).splitlines()[0] if str(error) else "it holds no numbers"
             continue
-        values |= found
-        listed += found
-        units |= dict.fromkeys(found, unit) if unit else {}
+        values |= numbers
+        listed += numbers
+        units |= dict.fromkeys(numbers, unit) if unit else {}
     return Columns(values, units, form, (), wrong, tuple(listed), refused)
 
 

@@ -74,25 +74,25 @@ def _data_files(path: Path, episodes: Sequence[int]) -> list[Path]:
 
 def _read_information(path: Path) -> Mapping[str, Any]:
     try:
-        found = json.loads(path.read_text(encoding="utf-8-sig"))
+        content = json.loads(path.read_text(encoding="utf-8-sig"))
     except (ValueError, RecursionError) as error:
         raise RigtwinError(f"{path} is not valid JSON: {error}") from None
-    if not isinstance(found, dict):
+    if not isinstance(content, dict):
         raise RigtwinError(f"{path}: expected an object with the data set's features")
-    return found
+    return content
 
 
 def _labels(information: Mapping[str, Any]) -> dict[str, list[str]]:
     """Return the labels of each feature's items: a list, or an object with a list in it."""
     features = information.get("features")
-    found: dict[str, list[str]] = {}
+    labels: dict[str, list[str]] = {}
     for name, feature in features.items() if isinstance(features, dict) else ():
         names = feature.get("names") if isinstance(feature, dict) else None
         if isinstance(names, dict):
             names = next((each for each in names.values() if isinstance(each, list)), None)
         if isinstance(names, list) and all(isinstance(label, str) for label in names):
-            found[name] = names
-    return found
+            labels[name] = names
+    return labels
 
 
 def _is_dataset(folder: Path) -> bool:

@@ -34,8 +34,17 @@ SCALED = (*COLUMN, "scale", "offset", "sign")
 
 @dataclass(frozen=True)
 class Column:
-    """A column of the file. unit: None if the file says it; wrap: after how many of its own counts
-    it begins again, None if it does not."""
+    """Column of the file.
+
+    Parameters
+    ----------
+    name
+        Name of the column.
+    unit
+        Unit of its numbers; None for the unit that the file states.
+    wrap
+        Range of a counter after which it begins again, counts; None for any other column.
+    """
 
     name: str
     unit: str | None
@@ -44,8 +53,10 @@ class Column:
 
 @dataclass(frozen=True)
 class Source:
-    """Where a channel's values come from: sign·scale·column + offset, after conversion to SI; a
-    formula of columns in SI; or a constant."""
+    """Source of a channel's values: a column, a formula of columns in SI, or a constant.
+
+    The values of a column are sign · scale · column + offset, with the column in SI.
+    """
 
     column: Column | None = None
     scale: float = 1.0
@@ -107,13 +118,13 @@ class Map:
     @property
     def inputs(self) -> dict[str, Column]:
         """Columns to read: by the channel's name, and by their name in formulas."""
-        found: dict[str, Column] = {}
+        inputs: dict[str, Column] = {}
         for channel, source in self.channels.items():
             if source.column is not None:
-                found[".".join(channel)] = source.column
+                inputs[".".join(channel)] = source.column
             for name in source.formula.inputs if source.formula is not None else ():
-                found[name] = self.columns.get(name, Column(name, None, None))
-        return found
+                inputs[name] = self.columns.get(name, Column(name, None, None))
+        return inputs
 
     @property
     def selection(self) -> Selection:
@@ -232,7 +243,7 @@ def _map(document: Mapping[str, Any]) -> Map:
             '[channels] is missing; expected lines such as "/sensor.position" = { column = "pos", '
             'unit = "mm" }'
         )
-    columns = {name: _named(name, each) for name, each in _tables(document, "columns").items()}
+    columns = {name: _named(name, table) for name, table in _tables(document, "columns").items()}
     constants = {
         name: _number(f"[constants] {name}", each)
         for name, each in _tables(document, "constants").items()
@@ -241,7 +252,7 @@ def _map(document: Mapping[str, Any]) -> Map:
         raise RigtwinError(f"[constants] {twice[0]}: [columns] has that name too")
     for topic in TOPICS:
         check_names(topic, [field for of, field in map(_channel, channels) if of == topic])
-    found = {_channel(name): _source(name, table, constants) for name, table in channels.items()}
+    sources = {_channel(name): _source(name, table, constants) for name, table in channels.items()}
     controller = document.get("controller", {})
     if not isinstance(controller, Mapping) or not all(
         isinstance(v, int | float | str) for v in controller.values()
@@ -257,16 +268,16 @@ def _map(document: Mapping[str, Any]) -> Map:
         start=_number("[time] start", time.get("start", 0.0)),
         until=_number("[time] until", time.get("until", 1e12)),
         columns=columns,
-        channels=found,
+        channels=sources,
         controller=dict(controller),
         episode=episode,
         episodes=episodes,
     )
 
 
-def _episodes(given: object) -> tuple[str | None, tuple[int, ...]]:
+def _episodes(entry: object) -> tuple[str | None, tuple[int, ...]]:
     """Return the column that numbers the episodes, and the episodes to import."""
-    table = _require_keys("[episodes]", given, ("column", "take"))
+    table = _require_keys("[episodes]", entry, ("column", "take"))
     column = table.get("column")
     if column is not None and not (isinstance(column, str) and column):
         raise RigtwinError(f"[episodes] column = {column}: expected the name of a column")
@@ -299,21 +310,21 @@ def _tables(document: Mapping[str, Any], name: str) -> Mapping[str, Any]:
     return table
 
 
-def _time_columns(given: object) -> tuple[str, ...]:
-    if isinstance(given, str):
-        return (given,)
-    if isinstance(given, list) and given and all(isinstance(each, str) for each in given):
-        if len(set(given)) < len(given):
-            raise RigtwinError(f"[time] column = {given}: one stands there twice")
-        return tuple(given)
-    raise RigtwinError(f"[time] column = {given}: expected a name, or a date's and a time's")
+def _time_columns(entry: object) -> tuple[str, ...]:
+    if isinstance(entry, str):
+        return (entry,)
+    if isinstance(entry, list) and entry and all(isinstance(each, str) for each in entry):
+        if len(set(entry)) < len(entry):
+            raise RigtwinError(f"[time] column = {entry}: a column is listed twice")
+        return tuple(entry)
+    raise RigtwinError(f"[time] column = {entry}: expected a name, or a date's and a time's")
 
 
-def _named(name: str, given: object) -> Column:
+def _named(name: str, entry: object) -> Column:
     where = f"[columns] {name}"
-    if isinstance(given, str):
-        return Column(given, None, None)
-    table = _require_keys(where, given, COLUMN)
+    if isinstance(entry, str):
+        return Column(entry, None, None)
+    table = _require_keys(where, entry, COLUMN)
     if "column" not in table:
         raise RigtwinError(f'{where}: expected column = "NAME"')
     return _column(where, table)
@@ -329,9 +340,9 @@ def _column(where: str, table: Mapping[str, Any]) -> Column:
     )
 
 
-def _source(name: str, given: object, constants: Mapping[str, float]) -> Source:
+def _source(name: str, entry: object, constants: Mapping[str, float]) -> Source:
     where = f"[channels] {name!r}"
-    table = _require_keys(where, given, (*SCALED, "constant", "formula"))
+    table = _require_keys(where, entry, (*SCALED, "constant", "formula"))
     ways = [way for way in ("column", "constant", "formula") if way in table]
     if len(ways) != 1:
         raise RigtwinError(
@@ -361,9 +372,9 @@ def _formula(where: str, text: object, constants: Mapping[str, float]) -> Formul
     if not isinstance(text, str):
         raise RigtwinError(f'{where} formula = {text}: expected a text, such as "4.2 * current"')
     try:
-        found = formula(text, constants)
+        compiled = formula(text, constants)
     except ValueError as error:
         raise RigtwinError(f"{where} formula: {error}") from None
-    if not found.inputs:
+    if not compiled.inputs:
         raise RigtwinError(f"{where} formula = {text!r}: it names no column")
-    return found
+    return compiled

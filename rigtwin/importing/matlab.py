@@ -33,13 +33,15 @@ def read_matlab(path: Path, selection: Selection) -> Columns:
         raise
     except Exception as error:  # The reader raises errors of any kind for a damaged file.
         raise _unreadable(path, error) from None
-    found: dict[str, Array] = {}
+    columns: dict[str, Array] = {}
     for name, value in content.items():
         if not name.startswith(("__", "#")):
-            found.update(_flatten(name, value))
-    longest = max(map(len, found.values()), default=0)
-    wanted = {name: len(value) for name, value in found.items() if _is_column(len(value), longest)}
-    values = {name: found[name] for name in wanted if selection.takes(name)}
+            columns.update(_flatten(name, value))
+    longest = max(map(len, columns.values()), default=0)
+    wanted = {
+        name: len(value) for name, value in columns.items() if _is_column(len(value), longest)
+    }
+    values = {name: columns[name] for name in wanted if selection.takes(name)}
     return Columns(values, {}, "MATLAB v5", listed=tuple(wanted))
 
 
@@ -51,10 +53,10 @@ def _is_column(length: int, longest: int) -> bool:
 def _flatten(name: str, value: Any) -> dict[str, Array]:
     """Return the columns of a variable of a v5 file."""
     if hasattr(value, "_fieldnames"):
-        found: dict[str, Array] = {}
+        columns: dict[str, Array] = {}
         for field in value._fieldnames:
-            found.update(_flatten(f"{name}.{field}", getattr(value, field)))
-        return found
+            columns.update(_flatten(f"{name}.{field}", getattr(value, field)))
+        return columns
     array = np.asarray(value)
     if array.dtype.kind not in NUMBERS:
         return {}
@@ -90,7 +92,7 @@ def _read_hdf(path: Path, selection: Selection) -> Columns:
         raise RigtwinError(
             f"{path} is MATLAB v7.3, which needs h5py: pip install 'rigtwin[import]'"
         ) from None
-    found: dict[str, tuple[Any, int, int]] = {}
+    columns: dict[str, tuple[Any, int, int]] = {}
 
     def list_columns(prefix: str, group: Any, above: tuple[int, ...] = ()) -> None:
         above = (*above, h5py.h5o.get_info(group.id).addr)
@@ -105,16 +107,16 @@ def _read_hdf(path: Path, selection: Selection) -> Columns:
             elif item.dtype.kind in NUMBERS:
                 shape = tuple(length for length in item.shape or () if length != 1)
                 for column, number in _name_columns(f"{prefix}{name}", shape).items():
-                    found[column] = (item, number, max(shape))
+                    columns[column] = (item, number, max(shape))
 
     values: dict[str, Array] = {}
     listed: list[str] = []
     try:
         with h5py.File(path, "r") as file:
             list_columns("", file)
-            longest = max((length for _, _, length in found.values()), default=0)
+            longest = max((length for _, _, length in columns.values()), default=0)
             name, content = "", np.empty(0)
-            for column, (item, number, length) in found.items():
+            for column, (item, number, length) in columns.items():
                 if not _is_column(length, longest):
                     continue
                 listed.append(column)

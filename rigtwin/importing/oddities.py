@@ -1,4 +1,4 @@
-"""What people should look at in a signal before they believe it."""
+"""Irregularities of a signal that a person should check before using it."""
 
 from __future__ import annotations
 
@@ -8,25 +8,25 @@ from rigtwin.numerics.arrays import Array
 from rigtwin.signals.runs import runs_at_ends
 
 OUTLIER = 100.0
-"""Times the range of nearly all of a signal at which a sample is damage."""
+"""Distance from the median, in ranges of 99.8 % of the signal, above which a sample is damaged."""
 
 
 COUNTERS = tuple(2.0**bits for bits in (8, 10, 12, 14, 16, 20, 24, 32))
-"""After how many counts counters begin again."""
+"""Usual ranges of counters, counts."""
 
 
 def looks_wrapped(counts: Array) -> float | None:
-    """After how many counts a column seems to begin again.
+    """Return the range of the counter that a column seems to hold.
 
     Parameters
     ----------
     counts
-        As the file has them, shape (rows,).
+        Column as the file states it, shape (rows,).
 
     Returns
     -------
     float or None
-        None if it does not seem to.
+        Range, counts; None if the column does not seem to hold a counter that wraps.
     """
     known = counts[np.isfinite(counts)]
     if len(known) < 2:
@@ -39,20 +39,22 @@ def looks_wrapped(counts: Array) -> float | None:
 
 
 def find_oddities(values: Array, time: Array) -> list[str]:
-    """What is odd in a channel, a line each: nothing moves, damage, a converter's end of range.
+    """Return the irregularities of a channel: no motion, damaged samples, a saturated converter.
 
     Parameters
     ----------
-    values, time
-        Shape (ticks,).
+    values
+        Values of the channel, shape (ticks,).
+    time
+        Time of the ticks, s, shape (ticks,).
     """
     if np.ptp(values) == 0.0:
         return [f"is {values[0]:g} throughout"]
-    found = []
+    oddities = []
     spread = float(np.subtract(*np.quantile(values, [0.999, 0.001])))
     far = np.abs(values - np.median(values))
     if spread > 0.0 and far.max() > OUTLIER * spread:
-        found.append(
+        oddities.append(
             f"is {values[np.argmax(far)]:.4g} at {time[np.argmax(far)]:.4g} s, "
             "far outside of all else"
         )
@@ -60,8 +62,8 @@ def find_oddities(values: Array, time: Array) -> list[str]:
     for extreme, start in ends.items():
         side = "above" if extreme == values.max() else "below"
         share = 100.0 * float(np.mean(values == extreme))
-        found.append(
+        oddities.append(
             f"is cut off {side} {extreme:.6g} ({share:.2g} % of the ticks), "
             f"first at {time[start]:.4g} s"
         )
-    return found
+    return oddities

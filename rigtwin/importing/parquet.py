@@ -60,16 +60,16 @@ def read_tables(
         raise RigtwinError(
             f"{paths[0].parent}: its files do not have the same columns: {_first_line(error)}"
         ) from None
-    found = expand(dict(zip(table.column_names, table.columns, strict=True)), labels or {})
-    values = {name: column for name, column in found.values.items() if selection.takes(name)}
-    listed = (*found.values, *(name for name in names if name not in needed))
+    expansion = expand(dict(zip(table.column_names, table.columns, strict=True)), labels or {})
+    values = {name: column for name, column in expansion.values.items() if selection.takes(name)}
+    listed = (*expansion.values, *(name for name in names if name not in needed))
     return Columns(
         values,
-        {name: unit for name, unit in found.units.items() if name in values},
+        {name: unit for name, unit in expansion.units.items() if name in values},
         "parquet",
-        wrong=found.wrong,
+        wrong=expansion.wrong,
         listed=listed,
-        refused={**found.refused, **repeated},
+        refused={**expansion.refused, **repeated},
     )
 
 

@@ -16,11 +16,12 @@ from rigtwin.importing.selection import EVERYTHING, Selection
 
 
 def read_json(path: Path, _: Selection = EVERYTHING) -> Columns:
-    """Columns of a JSON file: a list of records, an object with such a list in it, an object with a
-    list of numbers a column, or a record a line.
+    """Read the columns of a JSON file.
 
-    A record's inner object `{"motor": {"u": 1}}` is the column `motor.u`, its inner list
-    `{"q": [1, 2]}` the columns `q:1` and `q:2`. Raises RigtwinError if none of these is in it.
+    The file is a list of records, an object that contains such a list, an object with one list of
+    numbers per column, or one record per line. A record's inner object `{"motor": {"u": 1}}` is
+    the column `motor.u`, its inner list `{"q": [1, 2]}` the columns `q:1` and `q:2`. Raises
+    RigtwinError for any other content.
     """
     text = path.read_text(encoding="utf-8-sig", errors="replace")
     try:
@@ -48,37 +49,36 @@ def read_json(path: Path, _: Selection = EVERYTHING) -> Columns:
 
 
 def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """An object whose keys are all different. Raises ValueError for another, of which JSON does not
-    say what it means."""
-    found = dict(pairs)
-    if len(found) < len(pairs):
+    """Return an object. Raises ValueError for a repeated key, which JSON leaves undefined."""
+    record = dict(pairs)
+    if len(record) < len(pairs):
         names = [name for name, _ in pairs]
-        raise ValueError(f"{next(n for n in names if names.count(n) > 1)!r} stands there twice")
-    return found
+        raise ValueError(f"{next(n for n in names if names.count(n) > 1)!r} is listed twice")
+    return record
 
 
 def _find_records(content: Any) -> Sequence[Mapping[str, Any]] | None:
-    """The list of records in a document, the longest of several; None if there is none."""
+    """Return the longest list of records in a document; None without one."""
     if isinstance(content, list):
         records = content and all(isinstance(each, Mapping) for each in content)
         return content if records else None
     if isinstance(content, Mapping):
-        inner = [found for value in content.values() if (found := _find_records(value))]
+        inner = [records for value in content.values() if (records := _find_records(value))]
         return max(inner, key=len, default=None)
     return None
 
 
 def _flatten(prefix: str, record: Mapping[str, Any], lists: bool = True) -> dict[str, Any]:
-    found: dict[str, Any] = {}
+    columns: dict[str, Any] = {}
     for name, value in record.items():
-        own = f"{prefix}{name}"
+        column = f"{prefix}{name}"
         if isinstance(value, Mapping):
-            found |= _flatten(f"{own}.", value, lists)
+            columns |= _flatten(f"{column}.", value, lists)
         elif isinstance(value, list) and lists:
-            found |= {f"{own}:{place}": each for place, each in enumerate(value, start=1)}
+            columns |= {f"{column}:{place}": item for place, item in enumerate(value, start=1)}
         else:
-            found[own] = value
-    return found
+            columns[column] = value
+    return columns
 
 
 def _of_records(records: Sequence[Mapping[str, Any]]) -> Columns:

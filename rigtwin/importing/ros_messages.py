@@ -51,9 +51,9 @@ def list_numbers(
 
 def _labels_of(message: Any) -> Sequence[str]:
     for name in LABELS:
-        found = getattr(message, name, None)
-        if isinstance(found, list) and found and all(isinstance(label, str) for label in found):
-            return found
+        names = getattr(message, name, None)
+        if isinstance(names, list) and names and all(isinstance(label, str) for label in names):
+            return names
     return ()
 
 

@@ -34,7 +34,7 @@ class Series:
     numbers
         Values, one a sample.
     join
-        How the signal is taken to other times.
+        Method by which the signal is evaluated at other times.
     """
 
     times: array[int] = field(default_factory=lambda: array("q"))

@@ -20,43 +20,46 @@ _LEADING = re.compile(r"(\d{1,2})([./-])(\d{1,2})[./-]")
 
 
 def clock_of(cell: str) -> float | None:
-    """A time of day in s; None if the cell is none."""
-    found = _CLOCK.fullmatch(cell.strip())
-    if found is None:
+    """Return a time of day in s since midnight; None for any other cell."""
+    match = _CLOCK.fullmatch(cell.strip())
+    if match is None:
         return None
-    hours, minutes, seconds, half = found.groups()
+    hours, minutes, seconds, half = match.groups()
     hour = int(hours) % 12 + 12 * (half.lower() == "pm") if half else int(hours)
     return 3600.0 * hour + 60.0 * int(minutes) + float((seconds or "0").replace(",", "."))
 
 
 def stamps_of(cells: Sequence[str]) -> Array | None:
-    """Dates with or without times, or times of day, in s.
+    """Return dates or times of day in s.
 
-    Times of day go on past midnight. A date without a zone is in universal time, so that no change
-    of the clocks lies in it.
+    Times of day continue past midnight. A date without a zone is in universal time, so that no
+    daylight-saving change falls into the recording.
 
     Parameters
     ----------
     cells
-        Of one column.
+        Cells of one column.
 
     Returns
     -------
     array or None
-        Shape (rows,); None if one of them is neither a date nor a time of day.
+        Times, s, shape (rows,); None if a cell is neither a date nor a time of day.
     """
     clocks = [clock_of(cell) for cell in cells]
     if all(clock is not None for clock in clocks):
         return np.unwrap(np.array(clocks, float), period=DAY)
     first = _is_day_first(cells)
-    found = [_date(cell.strip(), first) for cell in cells]
-    return None if any(each is None for each in found) else np.array(found, float)
+    dates = [_date(cell.strip(), first) for cell in cells]
+    return None if any(date is None for date in dates) else np.array(dates, float)
 
 
 def _is_day_first(cells: Sequence[str]) -> bool:
-    """Whether 3/4 is the third of April: by a number above 12, by a.m. and p.m., by the dot; else
-    by what makes the shorter recording."""
-    pairs = [found for cell in cells if (found := _LEADING.match(cell.strip()))]
+    """Return whether 3/4 is the third of April rather than the fourth of March.
+
+    Dots and a first number above 12 mean that the day comes first; a second number above 12 and
+    a.m. or p.m. that the month does. Otherwise the shorter recording decides.
+    """
+    pairs = [match for cell in cells if (match := _LEADING.match(cell.strip()))]
     if not pairs:
         return True
     if pairs[0].group(2) == "." or any(int(pair.group(1)) > 12 for pair in pairs):

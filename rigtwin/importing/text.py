@@ -19,17 +19,28 @@ from rigtwin.importing.selection import EVERYTHING, Selection
 from rigtwin.importing.units import is_unit
 
 SEPARATORS = (";", "\t", ",", "|", " ")
-"""In the order in which they are preferred where several would do."""
+"""Separators, in the order in which they are preferred where several fit."""
 SURE = 5
-"""Lines of as many cells each, words in the same ones, that are the beginning of the data."""
+"""Number of consecutive lines of one shape that mark the beginning of the data."""
 HEADER = 400
-"""Lines within which the data must begin."""
+"""Number of lines within which the data must begin."""
 
 
 @dataclass(frozen=True)
 class Layout:
-    """How a text file is written. first: line at which the data begin; words: places of the columns
-    that hold words."""
+    """Layout of a text file.
+
+    Parameters
+    ----------
+    separator, decimal
+        Separator of the cells, and the decimal sign.
+    first
+        Index of the line at which the data begin.
+    names, units
+        Names and units of the columns.
+    words
+        Places of the columns that hold words.
+    """
 
     separator: str
     decimal: str
@@ -41,7 +52,17 @@ class Layout:
 
 @dataclass(frozen=True)
 class Line:
-    """cells: how many; words: places of those that are no values; numbers: how many are numbers."""
+    """Shape of one line.
+
+    Parameters
+    ----------
+    cells
+        Number of cells.
+    words
+        Places of the cells that are no values.
+    numbers
+        Number of cells that are numbers.
+    """
 
     cells: int
     words: frozenset[int]
@@ -73,53 +94,55 @@ def read_text(path: Path, selection: Selection = EVERYTHING) -> Columns:
     while head and not head[-1].strip():
         head.pop()
     try:
-        found = find_layout(head)
+        layout = find_layout(head)
     except RigtwinError as error:
         raise RigtwinError(f"{path}: {error}") from None
-    if found is None:
+    if layout is None:
         raise RigtwinError(f"{path}: no lines of numbers in its first {HEADER} lines")
-    refused = repeated_names(found.names)
+    refused = repeated_names(layout.names)
     known = {
         name: place
-        for place, name in enumerate(found.names)
-        if place not in found.words and name not in refused
+        for place, name in enumerate(layout.names)
+        if place not in layout.words and name not in refused
     }
     needed = {name: place for name, place in known.items() if selection.takes(name)}
-    columns, notes, lines = _read_columns(path, encoding, head, found, list(needed.values()))
+    columns, notes, lines = _read_columns(path, encoding, head, layout, list(needed.values()))
     values = {name: columns[place].values for name, place in needed.items()}
     wrong = {
         name: f"{cell[:40]!r} in line {lines[row]}"
         for name, place in needed.items()
         for row, cell in filter(None, [columns[place].wrong])
     }
-    units = {n: u for n, u in zip(found.names, found.units, strict=True) if u and n in values}
+    units = {n: u for n, u in zip(layout.names, layout.units, strict=True) if u and n in values}
     for name, place in needed.items():
         if columns[place].are_stamps:
             units.setdefault(name, "s")
-    mark = {"\t": "tab", " ": "space"}.get(found.separator, found.separator)
-    form = f"text, separated by {mark}, decimal {found.decimal}, data from line {found.first + 1}"
-    if found.words:
-        form += f"; words in {', '.join(found.names[place] for place in sorted(found.words))}"
-        first = split_cells(head[found.first], found.separator)
+    mark = {"\t": "tab", " ": "space"}.get(layout.separator, layout.separator)
+    form = f"text, separated by {mark}, decimal {layout.decimal}, data from line {layout.first + 1}"
+    if layout.words:
+        form += f"; words in {', '.join(layout.names[place] for place in sorted(layout.words))}"
+        first = split_cells(head[layout.first], layout.separator)
         refused |= {
-            found.names[place]: f"it holds {first[place][:40]!r} in line {found.first + 1}, which "
+            layout.names[
+                place
+            ]: f"it holds {first[place][:40]!r} in line {layout.first + 1}, which "
             "was taken for a word; expected plain numbers, such as 1234.5, without thousands "
             "separators, and not hexadecimal"
-            for place in found.words
+            for place in layout.words
         }
     return Columns(values, units, form, notes, wrong, listed=tuple(known), refused=refused)
 
 
 def _read_columns(
-    path: Path, encoding: str, head: Sequence[str], found: Layout, places: Sequence[int]
+    path: Path, encoding: str, head: Sequence[str], layout: Layout, places: Sequence[int]
 ) -> tuple[Mapping[int, Numbers], tuple[str, ...], Sequence[int]]:
     """Return the numbers in these places, what was odd, and the number of each row's line."""
-    layout = (found.separator, found.decimal, len(found.names), places)
-    fast = read_plain(path, encoding, head[: found.first], *layout)
+    arguments = (layout.separator, layout.decimal, len(layout.names), places)
+    fast = read_plain(path, encoding, head[: layout.first], *arguments)
     if fast is not None:
         return {place: Numbers(values) for place, values in fast.items()}, (), ()
-    lines = islice(enumerate(read_lines(path, encoding), start=1), found.first, None)
-    rows = gather_rows(path, lines, *layout)
+    lines = islice(enumerate(read_lines(path, encoding), start=1), layout.first, None)
+    rows = gather_rows(path, lines, *arguments)
     columns = {place: builder.finish() for place, builder in rows.columns.items()}
     return columns, tuple(rows.notes), rows.numbers
 
@@ -134,7 +157,7 @@ def _look_at(line: str, separator: str, decimal: str) -> Line:
 
 
 def find_layout(lines: Sequence[str]) -> Layout | None:
-    """How a text is written; None if no lines of numbers are in it."""
+    """Return the layout of a text; None if it has no lines of numbers."""
     best: tuple[tuple[int, int], Layout] | None = None
     for separator in SEPARATORS:
         for decimal in (".", ","):
@@ -160,21 +183,22 @@ def find_layout(lines: Sequence[str]) -> Layout | None:
 
 
 def _begins(seen: Sequence[Line], at: int) -> bool:
-    """Whether the data begin here: as many cells in each of some lines, words in the same ones."""
-    block, here = seen[at : at + SURE], seen[at]
+    """Return whether the data begin at a line: the next lines have its number of cells, and words
+    in the same places."""
+    block, start = seen[at : at + SURE], seen[at]
     return (
-        here.numbers > 0
-        and len(here.words) < here.cells
-        and all((each.cells, each.words) == (here.cells, here.words) for each in block)
+        start.numbers > 0
+        and len(start.words) < start.cells
+        and all((each.cells, each.words) == (start.cells, start.words) for each in block)
         and (len(block) == SURE or at + len(block) == len(seen))
     )
 
 
-def _read_header(lines: Sequence[str], found: Layout, columns: int) -> Layout:
-    """The layout with names and units from the lines above the data."""
+def _read_header(lines: Sequence[str], layout: Layout, columns: int) -> Layout:
+    """Return the layout with names and units from the lines above the data."""
     above = []
-    for line in reversed(lines[: found.first]):
-        cells = split_cells(line.lstrip("#%"), found.separator)
+    for line in reversed(lines[: layout.first]):
+        cells = split_cells(line.lstrip("#%"), layout.separator)
         while len(cells) > columns and not cells[-1]:
             cells.pop()
         if len(cells) == columns and any(cells):
@@ -190,7 +214,7 @@ def _read_header(lines: Sequence[str], found: Layout, columns: int) -> Layout:
         else:
             names = nearest
     pairs = [split_unit(name, unit) for name, unit in zip(names, units, strict=True)]
-    return replace(found, names=tuple(n for n, _ in pairs), units=tuple(u for _, u in pairs))
+    return replace(layout, names=tuple(n for n, _ in pairs), units=tuple(u for _, u in pairs))
 
 
 ENDINGS = (".csv", ".txt", ".tsv", ".dat", ".asc", ".log")

@@ -1,4 +1,4 @@
-"""A recording's time base: out of time stamps, without what is there twice, at even ticks."""
+"""Time base of a recording: repeated rows, period of the time stamps, even ticks."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ Signals = Mapping[str, Array]
 
 
 def drop_repeats(time: Array, signals: Signals, report: list[str]) -> tuple[Array, Signals]:
-    """Without rows that are there twice, which the report says.
+    """Return time and signals without repeated rows, whose number is added to the report.
 
-    Raises RigtwinError if time goes back, or has two different values at once.
+    Raises RigtwinError if time goes back, or if rows of the same time have different values.
     """
     steps = np.diff(time)
     if (steps < 0).any():
@@ -50,7 +50,8 @@ def drop_repeats(time: Array, signals: Signals, report: list[str]) -> tuple[Arra
 
 
 def find_period(time: Array) -> float:
-    """The period of time stamps, as round as they allow."""
+    """Return the period of time stamps, s, rounded as far as the stamps allow."""
+    # The median is robust against gaps; the mean of the regular steps averages out jitter.
     steps = np.diff(time)
     typical = float(np.median(steps))
     regular = np.abs(steps - typical) < JITTER * typical
@@ -101,7 +102,7 @@ def require_plausible(period: float, said: bool) -> None:
 
 
 def require_even_ticks(time: Array, period: float, report: list[str]) -> None:
-    """Raises RigtwinError if the time stamps are not those of one period."""
+    """Raise RigtwinError if the time stamps have gaps; report their drift and jitter."""
     steps = np.diff(time)
     off = np.abs(steps - period) > JITTER * period
     if off.any():
@@ -126,9 +127,9 @@ def require_even_ticks(time: Array, period: float, report: list[str]) -> None:
 def resample(
     time: Array, signals: Signals, period: float, wanted: float, report: list[str]
 ) -> tuple[Array, Signals]:
-    """At another period, straight between samples and over gaps, which the report says.
+    """Return time and signals at another period, interpolated linearly; report bridged gaps.
 
-    Smoothed first where that is longer, so that nothing is aliased.
+    A low pass runs first where the new period is longer, so that nothing is aliased.
     """
     bridged = np.diff(time)
     bridged = bridged[bridged > (1.0 + JITTER) * period]
@@ -137,13 +138,14 @@ def resample(
             f"{len(bridged)} gaps are bridged straight, the longest of {bridged.max():.4g} s, "
             f"{bridged.sum():.4g} s in all"
         )
-    from scipy.signal import butter, sosfiltfilt  # Late: it takes a second.
+    # Importing scipy.signal takes a second, which only this function pays for.
+    from scipy.signal import butter, sosfiltfilt
 
     ticks = np.arange(int((time[-1] - time[0]) / wanted + 1e-6) + 1) * wanted + time[0]
-    found = {}
+    resampled = {}
     for name, values in signals.items():
         if wanted > 1.5 * period and len(values) > 60:
             values = sosfiltfilt(butter(4, 0.8 * period / wanted, output="sos"), values)
-        found[name] = np.interp(ticks, time, values)
+        resampled[name] = np.interp(ticks, time, values)
     report.append(f"resampled from {period:g} s to {wanted:g} s: {len(ticks)} ticks")
-    return ticks, found
+    return ticks, resampled

@@ -1,4 +1,4 @@
-"""Units that other programs' data come in, and the SI unit of each."""
+"""Units of other programs' data, and their conversion to SI."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ UNITS: dict[str, tuple[str, float]] = {
     "1": ("1", 1.0),
     "%": ("1", 1e-2),
 }
-"""Unit → (SI unit, how many of that it is)."""
+"""Unit → SI unit, and the factor that converts to it."""
 _SPELLINGS = {
     "µm": "um",
     "μm": "um",
@@ -158,26 +158,29 @@ _SPELLINGS = {
 
 
 def unit_of(text: str) -> tuple[str, float]:
-    """(SI unit, factor) of a unit. Raises RigtwinError with what is known."""
+    """Return the SI unit of a unit, and the factor that converts to it.
+
+    Raises RigtwinError for an unknown unit, with the list of known ones.
+    """
     name = re.sub(r"^[\[(]|[\])]$", "", text.strip()).strip()
     for spelling in (name, re.sub(r"\s*[·*.\- ]\s*", " ", name)):
         unit = _SPELLINGS.get(spelling, spelling)
         if unit in UNITS:
             return UNITS[unit]
-    # Capitals, where they make no difference: KIP, RPM, Deg, but not Mm or mN.
+    # Capitals are ignored where they are not part of the unit: KIP, RPM, Deg, but not Mm or mN.
     small = name.lower()
-    alike = {
+    matches = {
         UNITS[_SPELLINGS.get(known, known)]
         for known in (*UNITS, *_SPELLINGS)
         if known.lower() == small
     }
-    if len(alike) == 1 and len(name) > 2:
-        return alike.pop()
+    if len(matches) == 1 and len(name) > 2:
+        return matches.pop()
     raise RigtwinError(f"unknown unit {text!r}; there are {', '.join(UNITS)}")
 
 
 def is_unit(text: str) -> bool:
-    """Whether a cell holds a unit's name."""
+    """Return whether a cell holds a unit's name."""
     try:
         unit_of(text)
     except RigtwinError:

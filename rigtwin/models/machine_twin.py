@@ -12,7 +12,7 @@ from rigtwin.description.catalogue import own_description
 from rigtwin.description.configuration import Configuration, flatten
 from rigtwin.description.control import FormulaControl
 from rigtwin.description.effects import apply_effects
-from rigtwin.description.limits import Tripped, find_trip, require_order
+from rigtwin.description.limits import LimitTrip, find_trip, require_order
 from rigtwin.description.machine import OWN, Machine, ReplayOf
 from rigtwin.errors import RigtwinError
 from rigtwin.models.commanding import Command, Tick, command_by_formula, command_by_function
@@ -112,7 +112,7 @@ def simulate_machine(
     demands: Mapping[str, Array],
     seed: int,
     controller: Tick | None = None,
-) -> tuple[Columns, Tripped | None]:
+) -> tuple[Columns, LimitTrip | None]:
     """Simulate a test of a described machine in memory.
 
     Parameters

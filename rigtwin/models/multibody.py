@@ -154,7 +154,7 @@ class Multibody:
         for tie in mechanism.ties_of(joints)[0]:
             place = names.index(tie.to)
             ties = np.vstack([ties, tie.ratio * ties[place]])
-            base = np.append(base, tie.apart + tie.ratio * base[place])
+            base = np.append(base, tie.offset + tie.ratio * base[place])
             names.append(tie.joint)
         self._ties, self._from, self._tied = ties, base, names
         self._numbers = [mechanism.number("joint", name) for name in names]

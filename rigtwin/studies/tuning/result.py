@@ -168,7 +168,7 @@ def count_runs(study: Study, posterior: Posterior | None) -> int:
     """
     budget = study.budget
     searches = 1 if posterior is None else 2
-    rigs = 1 + len(study.other_rigs) + (0 if posterior is None else 1 + len(posterior.otherwise))
+    rigs = 1 + len(study.other_rigs) + (0 if posterior is None else 1 + len(posterior.alternatives))
     points = budget.points if len(study.goals.minimise) == 2 else 0
     tried = searches * (budget.evaluations + 1) * budget.roads
     return tried + budget.held_out * (rigs * (1 + searches) + points)
@@ -230,9 +230,9 @@ def _rigs(study: Study, rig: UncertainRig, posterior: Posterior | None) -> list[
     rigs = [rig]
     if posterior is not None:
         rigs.append(NOMINAL)
-        for number, explanation in enumerate(posterior.otherwise):
+        for number, explanation in enumerate(posterior.alternatives):
             effect = explanation.effect
-            repeated = any(e.effect == effect for e in posterior.otherwise[:number])
+            repeated = any(e.effect == effect for e in posterior.alternatives[:number])
             name = f"twin with {effect} instead{f' ({number + 1})' if repeated else ''}"
             rigs.append(replace(NOMINAL, name=name, certain=explanation.changes))
     for label, changes in study.other_rigs.items():
