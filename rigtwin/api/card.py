@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from machines import DEFAULT_MACHINE
-from rigtwin.api.machines import Effects, Settings, effect_texts, the_machine
+from rigtwin.api.machines import Effects, Settings, effect_texts, resolve_machine
 from rigtwin.description.changes import with_changes
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.effects import apply_effects
@@ -97,7 +97,7 @@ def serve_card(
 
     if seed < 0 or not 0 <= port <= PORTS:
         raise RigtwinError(f"seed: expected 0 or more; port: 0 to {PORTS}")
-    on = the_machine(machine)
+    on = resolve_machine(machine)
     configuration = with_changes(on.configuration, settings)
     actual = apply_effects(configuration, effect_texts(effects))
     table = load_table(Path(card), on.physics.signals(on))
@@ -133,7 +133,7 @@ def release_card(card: str | Path, *, machine: Machine | str | Path = DEFAULT_MA
     RigtwinError
         If the card has no server.
     """
-    on = the_machine(machine)
+    on = resolve_machine(machine)
     table = load_table(Path(card), on.physics.signals(on))
     if not table.address:
         raise RigtwinError(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from rigtwin.api.recordings import Recording, faced
+from rigtwin.api.recordings import Recording, with_machine
 from rigtwin.describing.described import MODELS, Described, describe_log
 from rigtwin.errors import RigtwinError
 from rigtwin.recording import reader
@@ -104,4 +104,4 @@ def record_log(described: Described, log: Log | reader.Recording) -> Recording:
     log
         A log with the same columns.
     """
-    return faced(described.record(log_files(log)), described.machine)
+    return with_machine(described.record(log_files(log)), described.machine)

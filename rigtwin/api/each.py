@@ -11,8 +11,8 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from rigtwin.api.answers import diagnose
-from rigtwin.api.machines import Settings, machine_of, machines, tables_of, the_machine, twin_of
-from rigtwin.api.recordings import the_recording
+from rigtwin.api.machines import Settings, machine_of, machines, resolve_machine, tables_of, twin_of
+from rigtwin.api.recordings import resolve_recording
 from rigtwin.console import finite
 from rigtwin.description.machine import Machine
 from rigtwin.errors import RigtwinError
@@ -122,7 +122,7 @@ def diagnose_each(
     if isinstance(without, str) or not all(isinstance(each, str) for each in _list(without)):
         raise RigtwinError(f"without {without!r:.60}: expected a list of effects' names")
     given = tuple(tables_of(settings))
-    on = None if machine is None else the_machine(machine)
+    on = None if machine is None else resolve_machine(machine)
     try:
         told = json.dumps([given, sorted(without)], sort_keys=True)
     except (TypeError, ValueError):
@@ -135,7 +135,7 @@ def diagnose_each(
         for path in paths:
             try:
                 data = path.read_bytes()
-                described = machine_of(the_recording(path)) if on is None else on
+                described = machine_of(resolve_recording(path)) if on is None else on
             except (OSError, ValueError) as error:
                 said = getattr(error, "strerror", None) or error
                 refused[path] = f"cannot read {printable(str(path))}: {said}"

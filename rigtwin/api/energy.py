@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from rigtwin.api.machines import Settings, described_machine
-from rigtwin.api.recordings import the_recording
+from rigtwin.api.recordings import resolve_recording
 from rigtwin.description.changes import with_changes
 from rigtwin.description.machine import OWN, Machine
 from rigtwin.recording import reader
@@ -43,7 +43,7 @@ def energy_error(
     RigtwinError
         If a channel is missing, or the recording's settings are unknown.
     """
-    recording = the_recording(recording)
+    recording = resolve_recording(recording)
     found = described_machine(recording, machine)
     own = OWN in recording.controller and bool(settings)
     known = experiments_of(found)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rigtwin.api.machines import Settings, described_machine, twin_of
-from rigtwin.api.recordings import load, the_recording
+from rigtwin.api.recordings import load, resolve_recording
 from rigtwin.api.watching import PATIENCE, watch
 from rigtwin.description.machine import Machine
 from rigtwin.errors import RigtwinError
@@ -52,7 +52,7 @@ def look(
     RigtwinError
         Naming every fault of the data that makes a comparison meaningless.
     """
-    recording = the_recording(recording)
+    recording = resolve_recording(recording)
     found = described_machine(recording, machine)
     return Look(found, recording, twin_of(found, settings, without))
 

@@ -11,7 +11,7 @@ from datetime import date
 from pathlib import Path
 
 from machines import DEFAULT_MACHINE
-from rigtwin.api.machines import Effects, Settings, effect_texts, the_machine
+from rigtwin.api.machines import Effects, Settings, effect_texts, resolve_machine
 from rigtwin.api.recordings import Recording, load
 from rigtwin.description.changes import read_toml, with_changes
 from rigtwin.description.configuration import Configuration
@@ -118,7 +118,7 @@ def plan_test(
     """
     if not isinstance(seed, int) or seed < 0:
         raise RigtwinError(f"seed {seed!r:.60}: expected a whole number from 0")
-    on = the_machine(machine)
+    on = resolve_machine(machine)
     found = find_experiment(on, experiment)
     configuration = check_settings(on, found.configuration, settings)
     own = None if controller is None else custom_controller(controller)
@@ -377,7 +377,7 @@ def run_session(
         For a mistake in any test of the list, or a folder into which another session runs, before
         anything moves.
     """
-    folder, on = Path(folder), the_machine(machine)
+    folder, on = Path(folder), resolve_machine(machine)
 
     def find_test(name: str) -> Experiment:
         return find_experiment(on, name)

@@ -21,7 +21,7 @@ from experiments.thesis.result import reproduce as reproduce_thesis
 from experiments.tuning import find_study
 from experiments.vehicles import find_vehicle
 from referee import arm, check, wild
-from rigtwin.api.machines import the_machine
+from rigtwin.api.machines import resolve_machine
 from rigtwin.description.machine import Machine
 from rigtwin.description.posterior import load_posterior
 from rigtwin.errors import RigtwinError
@@ -71,7 +71,7 @@ def identifiability(
         Effects that leave a trace of their own, those that leave none, and those whose trace others
         can leave as well.
     """
-    return find_identifiable(the_machine(of), seconds, progress)
+    return find_identifiable(resolve_machine(of), seconds, progress)
 
 
 def tune(
@@ -125,7 +125,7 @@ def tune(
     """
     if seed < 0:
         raise RigtwinError(f"seed {seed}: expected 0 or more")
-    of = None if machine is None else the_machine(machine)
+    of = None if machine is None else resolve_machine(machine)
     found = find_study(
         study, settings, machine=of, roads=roads, held_out=held_out, evaluations=evaluations
     )
