@@ -84,7 +84,7 @@ WRONG: list[tuple[str, tuple[object, ...], dict[str, object], str]] = [
     ("tune", (5,), {}, "study 5: expected text"),
     ("tune", ("skyhook",), {"seed": "x"}, "seed 'x': expected a whole number"),
     ("tune", ("skyhook",), {"settings": 5}, "settings 5: expected a list, each text"),
-    ("reproduce", (5,), {}, "what 5: expected text or None"),
+    ("reproduce", (5,), {}, "part 5: expected text or None"),
     ("machine", (5,), {}, "5"),
 ]
 

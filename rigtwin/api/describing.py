@@ -11,7 +11,8 @@ from rigtwin.errors import RigtwinError
 from rigtwin.recording import reader
 
 Log = str | Path | Sequence[str | Path]
-"""Log of another program: a file, or several that are put side by side; "a.csv+b.csv" is the same."""
+"""Log of another program: a file, or several that are put side by side. A text "a.csv+b.csv" names
+two files."""
 SEPARATOR = "+"
 """Separator of a log's files in one text."""
 
@@ -61,8 +62,8 @@ def describe(
     Examples
     --------
     >>> described = rigtwin.describe("arm.xml", "log.csv")  # doctest: +SKIP
-    >>> described = rigtwin.describe(
-    ...     "arm.xml", "log.csv", columns={"elbow.position": "q2 [deg]"}, out="arm")  # doctest: +SKIP
+    >>> columns = {"elbow.position": "q2 [deg]"}
+    >>> described = rigtwin.describe("arm.xml", "log.csv", columns=columns)  # doctest: +SKIP
     """
     if Path(model).suffix.lower() not in MODELS:
         raise RigtwinError(f"model {model}: expected a name that ends in {', '.join(MODELS)}")
