@@ -344,7 +344,7 @@ def test_mistakes_of_a_check_are_said_before_it_starts(tmp_path):
         with pytest.raises(rigtwin.RigtwinError, match="expected 1 or more"):
             check(0, folder=tmp_path)
     with pytest.raises(rigtwin.RigtwinError, match="0 to 1000"):
-        rigtwin.faults(each=2000)
+        rigtwin.faults(per_kind=2000)
     with pytest.raises(rigtwin.RigtwinError, match="unknown study"):
         rigtwin.tune("nonsense", out=tmp_path)
     assert not list(tmp_path.iterdir())
