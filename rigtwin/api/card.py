@@ -1,5 +1,5 @@
-"""Data acquisition card: a virtual card on a port, the check of a channel table, the release of lines
-that a dead program holds."""
+"""Data acquisition card: a virtual card on a port, the check of a channel table, the release of
+lines that a dead program holds."""
 
 from __future__ import annotations
 

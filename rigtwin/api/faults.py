@@ -105,7 +105,7 @@ def faults(
             raise RigtwinError(f"{name} {number}: expected 0 to {MOST}")
     if per_kind == per_process_kind == 0:
         raise RigtwinError(
-            "no session to run: expected per_kind (--each) or per_process_kind (--processes) above 0"
+            "no session to run: expected per_kind (--each) or per_process_kind (--processes)"
         )
     channels = load_table(Path(card))
     custom = None if controller is None else custom_controller(controller)

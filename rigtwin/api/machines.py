@@ -218,8 +218,8 @@ def _values(value: float | Mapping[str, float]) -> str:
     """Return an effect's values as text; the first parameter's name is left out."""
     if not isinstance(value, Mapping):
         return repr(float(value))
-    first, *others = value.items()
-    return ",".join([repr(float(first[1])), *(f"{name}={number!r}" for name, number in others)])
+    first, *rest = value.items()
+    return ",".join([repr(float(first[1])), *(f"{name}={number!r}" for name, number in rest)])
 
 
 def twin_of(

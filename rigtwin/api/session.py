@@ -92,7 +92,7 @@ class DryRun:
     cause : str
         Reason why the session ended, in words.
     passed : bool
-        Whether it reached its planned end. Only then may the rig be armed for this test.
+        True if the session reached its planned end. Only then may the rig be armed for this test.
     peaks : tuple of Peak
         Predicted peak of each limited quantity, with its limit and margin.
     obstacles : tuple of str
