@@ -85,7 +85,7 @@ def watch_effect(case: tuple[str, float, str, int]) -> str:
             if now.alarm is not None and now.alarm.suspects and not first:
                 first.append(_describe(now.alarm))
 
-        alarm = rigtwin.watch(path, told=note_first_suspect).alarm
+        alarm = rigtwin.watch(path, on_update=note_first_suspect).alarm
         if alarm is None:
             return f"| {name} = {value:g} | {test} | none | | |"
         after = f"{alarm.time - LATER:.2f} s"

@@ -240,7 +240,7 @@ def __getattr__(name: str) -> object:
     if name in _WHERE:
         value = getattr(import_module(f"rigtwin.api.{_WHERE[name]}"), name)
         if isinstance(value, type(__getattr__)):
-            value = import_module("rigtwin.api.arguments").explained(value)
+            value = import_module("rigtwin.api.arguments").check_arguments(value)
         globals()[name] = value
         return value
     raise AttributeError(f"module 'rigtwin' has no attribute {name!r}; it has {', '.join(__all__)}")

@@ -224,7 +224,10 @@ def test_experiments_and_controllers_of_ones_own_run_a_described_machine(tmp_pat
         (lambda rig: rigtwin.stability("car", tau=wrong("x")), "tau = 'x': expected a number"),
         (lambda rig: rigtwin.stability(wrong(5)), "vehicle 5: expected a name"),
         (lambda rig: rigtwin.rths(1, noise=wrong(-1)), "noise -1: expected a Noise"),
-        (lambda rig: rigtwin.watch("no.mcap", patience=math.nan), "a patience of nan s"),
+        (
+            lambda rig: rigtwin.watch("no.mcap", patience=math.nan),
+            "patience nan s: expected more than 0 s",
+        ),
     ],
 )
 def test_what_cannot_be_done_is_said_in_one_line(call, said):
@@ -342,7 +345,7 @@ def test_mistakes_of_a_check_are_said_before_it_starts(tmp_path):
         with pytest.raises(rigtwin.RigtwinError, match="expected 1 or more"):
             check(0, folder=tmp_path)
     with pytest.raises(rigtwin.RigtwinError, match="0 to 1000"):
-        rigtwin.faults(each=2000)
+        rigtwin.faults(per_kind=2000)
     with pytest.raises(rigtwin.RigtwinError, match="unknown study"):
         rigtwin.tune("nonsense", out=tmp_path)
     assert not list(tmp_path.iterdir())

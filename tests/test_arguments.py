@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import rigtwin
-from rigtwin.api.arguments import describe, explained, fits
+from rigtwin.api.arguments import check_arguments, describe, fits
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq.table import find_table
 
@@ -84,7 +84,7 @@ WRONG: list[tuple[str, tuple[object, ...], dict[str, object], str]] = [
     ("tune", (5,), {}, "study 5: expected text"),
     ("tune", ("skyhook",), {"seed": "x"}, "seed 'x': expected a whole number"),
     ("tune", ("skyhook",), {"settings": 5}, "settings 5: expected a list, each text"),
-    ("reproduce", (5,), {}, "what 5: expected text or None"),
+    ("reproduce", (5,), {}, "part 5: expected text or None"),
     ("machine", (5,), {}, "5"),
 ]
 
@@ -108,7 +108,7 @@ def test_a_wrong_type_is_said(
 def test_a_failure_of_right_arguments_stays_what_it_is() -> None:
     """As of a controller that a user wrote: where it failed is what is wanted then."""
 
-    @explained
+    @check_arguments
     def fail(number: int) -> int:
         return number // "text"  # type: ignore[operator]
 

@@ -227,7 +227,7 @@ def test_a_test_that_is_refused_leaves_the_recording_that_was_there(tmp_path):
         with pytest.raises(RigtwinError, match="plate_"):
             rigtwin.run_on_twin("drop", settings=wrong, path=path)
         with pytest.raises(RigtwinError, match="plate_"):
-            rigtwin.faults(each=1, processes=0, settings={"controller": unstable})
+            rigtwin.faults(per_kind=1, per_process_kind=0, settings={"controller": unstable})
     assert path.read_bytes() == before
 
 

@@ -67,7 +67,9 @@ class Pace:
 @pytest.mark.slow
 def test_it_says_what_is_wrong_and_becomes_the_page_of_the_whole_test(changed, tmp_path):
     said: list[str] = []
-    with rigtwin.show_live(changed, said=said.append, save_twin=tmp_path / "twin.toml") as page:
+    with rigtwin.show_live(
+        changed, on_message=said.append, save_twin=tmp_path / "twin.toml"
+    ) as page:
         wait_for_the_end(page)
         assert page.watch is not None
         assert page.watch.alarm is not None
@@ -82,7 +84,7 @@ def test_a_test_that_stops_without_an_end_is_shown_as_far_as_it_went(changed, tm
     path = tmp_path / "killed.mcap"
     path.write_bytes(changed.read_bytes()[: changed.stat().st_size // 2])
     said: list[str] = []
-    with rigtwin.show_live(path, said=said.append, patience=0.5) as page:
+    with rigtwin.show_live(path, on_message=said.append, patience=0.5) as page:
         wait_for_the_end(page)
     assert "nothing was added to it for 0.5 s" in said[-1]
 

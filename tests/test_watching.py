@@ -61,7 +61,9 @@ def test_a_nominal_test_gives_no_alarm(nominal):
 @pytest.mark.slow
 def test_an_effect_from_a_time_on_gives_an_alarm_and_its_name(changed):
     updates: list[tuple[float, bool]] = []
-    watch = rigtwin.watch(changed, told=lambda now: updates.append((now.judged, now.alarm is None)))
+    watch = rigtwin.watch(
+        changed, on_update=lambda now: updates.append((now.judged, now.alarm is None))
+    )
     alarm = watch.alarm
     assert alarm is not None
     assert LATER < alarm.time < LATER + 1.0
@@ -224,7 +226,7 @@ def test_a_damaged_stretch_does_not_end_the_watch(nominal, tmp_path):
 def test_it_can_be_stopped(nominal):
     updates: list[float] = []
     watch = rigtwin.watch(
-        nominal, told=lambda now: updates.append(now.judged), stop=lambda: len(updates) > 2
+        nominal, on_update=lambda now: updates.append(now.judged), stop=lambda: len(updates) > 2
     )
     assert len(updates) == 3
     assert watch.judged < 6.0

@@ -1,2 +1,1 @@
-"""What `import rigtwin` offers. The commands of the command line call these functions and nothing
-else."""
+"""Functions that `import rigtwin` offers. The command line calls these functions only."""

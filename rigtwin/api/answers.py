@@ -1,8 +1,8 @@
-"""What recordings say: diagnoses, comparisons, calibrations."""
+"""Questions to recordings: diagnosis, changes, comparison with the twin, calibration."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,7 +17,7 @@ from rigtwin.api.machines import (
     require_unrecorded,
     twin_of,
 )
-from rigtwin.api.recordings import the_recording
+from rigtwin.api.recordings import resolve_recording
 from rigtwin.components import RigPlant
 from rigtwin.description.machine import Machine
 from rigtwin.diagnosis.change import Changes
@@ -37,6 +37,9 @@ from rigtwin.studies.friction_spikes import Calibration, find_compensator
 
 Recorded = reader.Recording | str | Path
 """A recording, or the path of one."""
+LEAST_DETECTED, MOST_FALSE = 0.8, 0.1
+"""Least share of reversals that a friction compensator detects, and most false steps per reversal,
+on the recording it was identified from."""
 
 
 def diagnose(
@@ -52,52 +55,72 @@ def diagnose(
     columns: Mapping[str, str] | None = None,
     test: str = "",
 ) -> Diagnosis:
-    """Says why recordings of one machine and its twin disagree.
+    """Diagnose why recordings of one machine disagree with its twin.
+
+    Every effect that the machine can have is fitted, with all toleranced parameters free beside
+    it. Hypotheses are compared by cross-validation, and the answer states how far the gap shrinks
+    on data that were not fitted.
 
     Parameters
     ----------
     recordings
-        One, or several that are explained together; or their paths. Logs of other programs where
-        `machine` is a model.
+        Recording, or several of one machine that are explained jointly, or their paths. If
+        `machine` is a model, these are logs of other programs.
     machine
-        That they are of; by default the one that they name. An MJCF or URDF is described from the
-        first log, see `describe`; what was assumed is in the notes of the answer.
+        Machine the recordings belong to, or its name, or the path of its description. Defaults to
+        the one named in the first recording. A model (MJCF or URDF) is described from the first
+        log, see `describe`; the answer's notes state the assumptions.
     held_out
-        Recordings of the same machine that the correction is judged on and not fitted to.
+        Recordings of the same machine on which the correction is judged. They are not fitted.
     settings
-        Changes of the twin that they are compared with: of its plant and `timing.timestep`.
+        Changes of the twin before the comparison: of its plant and `timing.timestep`. All other
+        settings are the recording's own.
     without
-        Effects that are taken out of the twin first, such as "coulomb@rail".
+        Effects of the nominal machine that are removed from the twin first, such as
+        "coulomb@rail".
     exclude
-        Effects that are not searched for, such as "delay@motor", or "delay" at every component.
+        Effects that are not searched for: "delay@motor", or "delay" at every component.
     progress
-        Called with a stage's name and the steps done in it.
+        Function called with the name of a stage and the number of steps since its last call.
     first_look
-        Called after a second or two with what the gap is and which effects may be behind it, while
-        the judgement goes on.
+        Function called after a second or two with a `FirstLook`: the gap of each sensor and the
+        effects that may cause it. The diagnosis continues meanwhile.
     columns, test
-        What a log does not state, see `describe`; for a machine that is a model.
+        Statements about a log as `describe` takes them. They require a model as the machine.
 
     Returns
     -------
-    The verdict, the effects with confidence, where the gap lies, and how far it shrinks. In a
-    notebook it shows its report.
+    Diagnosis
+        Answer: `verdict` ("no gap", "explained", "partly explained", "unknown" or "unusable"),
+        `sentence`, `effects` with value, 95 % interval and confidence, `where` the gap lies, and
+        the `gap` before and after the correction, in units of white noise (1 is noise alone).
+        `report(path)` writes a report, `save_twin(path)` the corrected twin, and `machine` is the
+        corrected machine. In a notebook it shows its report.
 
     Raises
     ------
     RigtwinError
-        If the recordings' settings are unknown, or held-out data are not fit to be compared.
+        If there is no recording, one is named twice, its settings are unknown, or held-out data
+        are unfit for a comparison.
+
+    Examples
+    --------
+    >>> recording = rigtwin.run("suspension-rig", "imposed", seed=1,
+    ...                         effects={"viscous@motor": 50})  # doctest: +SKIP
+    >>> diagnosis = rigtwin.diagnose(recording)  # doctest: +SKIP
+    >>> [str(effect.name) for effect in diagnosis.effects]  # doctest: +SKIP
+    ['viscous@motor']
     """
-    given = read_inputs(recordings, machine, held_out, columns, test)
-    found = given.machine.excluding(names_of("exclude", exclude))
-    require_unrecorded(settings, found, [*given.recordings, *given.held_out])
-    base = twin_of(found, settings, without)
-    tests = [find_experiment(found, name) for name in found.next_tests]
+    inputs = read_inputs(recordings, machine, held_out, columns, test)
+    described = inputs.machine.excluding(names_of("exclude", exclude))
+    require_unrecorded(settings, described, [*inputs.recordings, *inputs.held_out])
+    base = twin_of(described, settings, without)
+    tests = [find_experiment(described, name) for name in described.next_tests]
     return find_reasons(
-        found,
-        given.recordings,
+        described,
+        inputs.recordings,
         base,
-        given.held_out,
+        inputs.held_out,
         tests,
         progress=progress,
         first_look=first_look,
@@ -105,15 +128,17 @@ def diagnose(
 
 
 @dataclass(frozen=True)
-class Given:
+class Inputs:
     """Recordings of one machine.
 
     Attributes
     ----------
     machine : Machine
-        Machine they belong to.
-    recordings, held_out : tuple of Recording
-        Recordings to fit, and recordings to judge on.
+        Machine of all recordings.
+    recordings : tuple of Recording
+        Recordings to fit, at least one.
+    held_out : tuple of Recording
+        Recordings to judge on.
     """
 
     machine: Machine
@@ -127,35 +152,36 @@ def read_inputs(
     held_out: Recorded | Sequence[Recorded],
     columns: Mapping[str, str] | None,
     test: str,
-) -> Given:
-    """Read recordings, or logs of a machine that is a model, see `diagnose`.
+) -> Inputs:
+    """Read the recordings that `diagnose` and `fit` take.
+
+    If the machine is a model, the recordings are logs: the first one describes the machine, and
+    all are converted to recordings of it.
 
     Raises
     ------
     RigtwinError
-        For no recording, one named twice, or a machine that cannot be told.
+        If there is no recording, one is named twice, or its machine is unknown.
     """
     if is_model(machine):
-        logs = _logs(recordings)
+        logs = _as_list(recordings)
         if not logs:
             raise RigtwinError("no recording to diagnose")
         described = describe(machine, logs[0], columns=columns, test=test)  # type: ignore[arg-type]
         recordings = [record_log(described, log) for log in logs]
-        held_out = [record_log(described, log) for log in _logs(held_out)]
+        held_out = [record_log(described, log) for log in _as_list(held_out)]
         machine = described.machine
     elif columns or test:
         raise RigtwinError("columns and test describe a log; expected a model as the machine")
-    several = list(_several(recordings))
-    apart = list(_several(held_out))
-    paths = [each.path.resolve() for each in (*several, *apart) if each.path.exists()]
-    if len(set(paths)) < len(paths) or not several:
+    fitted = [resolve_recording(recording) for recording in _as_list(recordings)]
+    judged = [resolve_recording(recording) for recording in _as_list(held_out)]
+    if not fitted:
+        raise RigtwinError("no recording to diagnose")
+    if _has_duplicate([*fitted, *judged]):
         raise RigtwinError(
-            "a recording is named twice; each counts once, and what is held out must not be fitted"
-            if several
-            else "no recording to diagnose"
+            "a recording is named twice; each counts once, and held-out data must not be fitted"
         )
-    found = described_machine(several[0], machine)
-    return Given(found, tuple(several), tuple(apart))
+    return Inputs(described_machine(fitted[0], machine), tuple(fitted), tuple(judged))
 
 
 def what_changed(
@@ -167,41 +193,51 @@ def what_changed(
     exclude: Sequence[str] = (),
     progress: Callable[[str, int], object] = lambda _stage, _steps: None,
 ) -> Changes:
-    """Says what changed between recordings of one machine, and what that goes with.
+    """Find the parameters that changed between recordings of one machine.
 
     Parameters
     ----------
     recordings
-        Two or more, in the order of time.
+        At least two recordings, or their paths, in the order of time.
     machine
-        That they are of; by default the one that they name.
+        Machine the recordings belong to, or its name, or the path of its description. Defaults to
+        the one named in the first recording.
     settings
-        Changes of the twin that they are compared with: of its plant and `timing.timestep`.
+        Changes of the twin before the comparison: of its plant and `timing.timestep`. All other
+        settings are the recording's own.
     without
-        Effects that are taken out of the twin first, such as "coulomb@rail".
+        Effects of the nominal machine that are removed from the twin first, such as
+        "coulomb@rail".
     exclude
-        Effects that are not searched for, such as "delay@motor", or "delay" at every component.
+        Effects that are not searched for: "delay@motor", or "delay" at every component.
     progress
-        Called with a stage's name and the steps done in it.
+        Function called with the name of a stage and the number of steps since its last call.
 
     Returns
     -------
-    Every parameter in every recording, which are not the same, and of which these cannot tell.
+    Changes
+        `sentence`, the answer in a sentence; `changed`, the parameters that differ, with their
+        value in every recording; `unseen`, effects that these recordings cannot show; `zeros`,
+        sensor offsets, which differ without a change of the machine.
 
     Raises
     ------
     RigtwinError
         For fewer than two recordings, one named twice, or data that cannot be diagnosed.
+
+    Examples
+    --------
+    >>> changes = rigtwin.what_changed(["monday.mcap", "friday.mcap"])  # doctest: +SKIP
+    >>> [parameter.name for parameter in changes.changed]  # doctest: +SKIP
     """
-    several = list(_several(recordings))
-    paths = [each.path.resolve() for each in several if each.path.exists()]
-    if len(set(paths)) < len(paths):
-        raise RigtwinError("a recording is named twice; it is the same as itself")
-    if not several:
-        raise RigtwinError("what changed is a question to two recordings or more; none was given")
-    found = described_machine(several[0], machine).excluding(names_of("exclude", exclude))
-    require_unrecorded(settings, found, several)
-    return find_changes(found, several, twin_of(found, settings, without), progress)
+    loaded = [resolve_recording(recording) for recording in _as_list(recordings)]
+    if _has_duplicate(loaded):
+        raise RigtwinError("a recording is named twice; expected different recordings")
+    if not loaded:
+        raise RigtwinError("what_changed needs at least two recordings; it has none")
+    described = described_machine(loaded[0], machine).excluding(names_of("exclude", exclude))
+    require_unrecorded(settings, described, loaded)
+    return find_changes(described, loaded, twin_of(described, settings, without), progress)
 
 
 def compare(
@@ -212,95 +248,136 @@ def compare(
     effects: Effects = (),
     progress: Callable[[str], object] = lambda _replay: None,
 ) -> Comparison:
-    """What a recording and a twin differ by: replay by replay of the suspension rig's components,
-    signal by signal of another machine.
+    """Compare a recording with its twin.
+
+    On the suspension rig, every component is replayed: driven by its recorded inputs, its output is
+    compared with the recorded one. On any other machine the signals are compared one by one.
 
     Parameters
     ----------
     recording
-        The data.
+        Recording, or its path.
     machine
-        That it is compared with; by default the one that it names.
+        Machine the recording belongs to, or its name, or the path of its description. Defaults to
+        the one named in the recording.
     settings
-        Changes of the twin: of its plant and `timing.timestep`.
+        Changes of the twin: of its plant and `timing.timestep`. All other settings are the
+        recording's own.
     effects
-        That the twin is given.
+        Effects added to the twin, such as {"coulomb@rail": 80}.
     progress
-        Called with each replay's name.
+        Function called with the name of each replay.
+
+    Returns
+    -------
+    Comparison
+        `replays`, replay → `Residual` with the residual's rms, its noise floor (both in `unit`),
+        their `ratio` (1 is noise alone) and the band of most of its power in Hz; `left_out`,
+        replay → reason why it was impossible; `notes`; `gap`, the rms of all residuals in units of
+        white noise.
 
     Raises
     ------
     RigtwinError
-        Naming every fault of the data that makes a comparison meaningless.
+        If the data make a comparison meaningless; the message names every fault.
+
+    Examples
+    --------
+    >>> import rigtwin
+    >>> recording = rigtwin.run("emps", "positioning", effects={"coulomb@guide": 20})
+    >>> rigtwin.compare(recording).gap > 2.0
+    True
     """
-    recording = the_recording(recording)
-    found = described_machine(recording, machine)
-    require_unrecorded(settings, found, [recording])
-    base = twin_of(found, settings, (), effect_texts(effects))
-    return compare_with_twin(found, recording, found.configuration_of(recording, base), progress)
+    recording = resolve_recording(recording)
+    described = described_machine(recording, machine)
+    require_unrecorded(settings, described, [recording])
+    base = twin_of(described, settings, (), effect_texts(effects))
+    configuration = described.configuration_of(recording, base)
+    return compare_with_twin(described, recording, configuration, progress)
 
 
 def compare_recordings(
     first: Recorded, second: Recorded
 ) -> tuple[dict[str, Residual], tuple[str, ...]]:
-    """Two recordings of one test, sensor by sensor.
+    """Compare two recordings of one test, sensor by sensor and tick by tick.
 
     Parameters
     ----------
     first, second
-        Of one machine.
+        Recordings of one machine, or their paths. Both need the same period.
 
     Returns
     -------
-    What they differ by, by sensor; and what was not the same in the tests, a line each.
+    residuals : dict
+        Sensor → `Residual` of the difference: its rms and noise floor (both in `unit`), and their
+        ratio. A ratio of 1 is noise alone.
+    differences : tuple of str
+        Test conditions that differ, one line each.
 
     Raises
     ------
     RigtwinError
-        If their periods differ or they share no sensor.
+        If the periods differ or the recordings share no sensor.
+
+    Examples
+    --------
+    >>> residuals, differences = rigtwin.compare_recordings(
+    ...     "rig.mcap", "twin.mcap")  # doctest: +SKIP
+    >>> residuals["load_cell"].ratio  # doctest: +SKIP
     """
-    first, second = the_recording(first), the_recording(second)
+    first, second = resolve_recording(first), resolve_recording(second)
     return find_differences(machine_of(first), first, second), differences(first, second)
 
 
 def calibrate(recording: Recorded) -> Calibration:
-    """The friction compensator's settings that a recording of the suspension rig asks for.
+    """Identify the friction compensator's settings from a recording of the suspension rig.
 
     Parameters
     ----------
     recording
-        Made without compensation, that reverses often, such as `friction-road`.
+        Recording without compensation whose motion reverses often, such as `friction-road`, or its
+        path.
+
+    Returns
+    -------
+    Calibration
+        Settings, and their score on the recording: reversals detected, and false steps. `toml()`
+        returns them as text for `--config`.
 
     Raises
     ------
     RigtwinError
-        If the data are unfit, or a compensator found from them would do harm.
+        If the data are unfit, or the compensator misses more than a fifth of the reversals or adds
+        false steps at more than a tenth of them.
     """
-    recording = the_recording(recording)
-    of = machine_of(recording)
-    if not isinstance(of.plant, RigPlant):
+    recording = resolve_recording(recording)
+    machine = machine_of(recording)
+    if not isinstance(machine.plant, RigPlant):
         raise RigtwinError(
-            f"{recording.path}: it is of machine {of.name!r}; expected a suspension rig"
+            f"{recording.path}: it is of machine {machine.name!r}; expected a suspension rig"
         )
-    configuration = of.configuration_of(recording)
-    require_fit(of, recording, configuration)
-    found = find_compensator(recording, configuration.controller)
-    if found.detected < 0.8 * found.reversals or found.false > 0.1 * found.reversals:
+    configuration = machine.configuration_of(recording)
+    require_fit(machine, recording, configuration)
+    calibration = find_compensator(recording, configuration.controller)
+    if (
+        calibration.detected < LEAST_DETECTED * calibration.reversals
+        or calibration.false > MOST_FALSE * calibration.reversals
+    ):
         raise RigtwinError(
-            f"{recording.path}: a compensator found from it would do harm; record a test that "
+            f"{recording.path}: a compensator identified from it would do harm; record a test that "
             "reverses often, such as friction-road, without compensation"
         )
-    return found
+    return calibration
 
 
-def _logs(given: Recorded | Sequence[Recorded]) -> list[Recorded]:
-    """Logs, or recordings, as a list."""
-    if isinstance(given, Sequence) and not isinstance(given, str):
-        return list(given)
-    return [given]
+def _as_list(recordings: Recorded | Sequence[Recorded]) -> list[Recorded]:
+    """Return one recording (or log) or several as a list."""
+    if isinstance(recordings, Sequence) and not isinstance(recordings, str):
+        return list(recordings)
+    return [recordings]
 
 
-def _several(given: Recorded | Sequence[Recorded]) -> Iterator[reader.Recording]:
-    several = given if isinstance(given, Sequence) and not isinstance(given, str) else [given]
-    for each in several:
-        yield the_recording(each)
+def _has_duplicate(recordings: Sequence[reader.Recording]) -> bool:
+    """Return whether two recordings are the same file. Those in memory have none."""
+    paths = [recording.path.resolve() for recording in recordings if recording.path.exists()]
+    return len(set(paths)) < len(paths)

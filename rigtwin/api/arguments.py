@@ -1,4 +1,4 @@
-"""What is wrong with the arguments of a call, said in one line."""
+"""Checks of a call's arguments against the function's annotations, each failure in one line."""
 
 from __future__ import annotations
 
@@ -20,57 +20,63 @@ NAMES = {
     Path: "a path",
     NoneType: "None",
 }
+"""Names of types in messages."""
 
 
-def explained(function: Function) -> Function:
-    """A function whose failure is laid to its arguments where they are of other types than it says.
+def check_arguments(function: Function) -> Function:
+    """Decorate a function so that arguments of a wrong type raise one clear line.
 
-    While it does not fail, only truth values are looked at: Python takes them for numbers.
+    Arguments are compared with the annotations only after the function has failed, so that a
+    successful call costs nothing. Truth values are the exception: Python accepts them as numbers,
+    so they are checked before the call.
 
     Parameters
     ----------
     function
-        With annotations.
+        Function with annotations.
 
     Returns
     -------
     function
-        Raises RigtwinError, with the argument and what was expected, where it would have raised
-        TypeError, AttributeError or ValueError.
+        The same function. Where it would raise TypeError, AttributeError or ValueError because of
+        an argument, it raises RigtwinError with the argument's name and the expected type.
     """
 
     @wraps(function)
-    def called(*values: Any, **named: Any) -> Any:
-        truths = any(isinstance(value, bool) for value in (*values, *named.values()))
-        if truths and (said := _mistake(function, values, named)) is not None:
-            raise RigtwinError(said)
+    def checked(*values: Any, **keywords: Any) -> Any:
+        truths = any(isinstance(value, bool) for value in (*values, *keywords.values()))
+        if truths and (mistake := _mistake(function, values, keywords)) is not None:
+            raise RigtwinError(mistake)
         try:
-            return function(*values, **named)
+            return function(*values, **keywords)
         except (TypeError, AttributeError, ValueError):
-            said = _mistake(function, values, named)
-            if said is None:
+            mistake = _mistake(function, values, keywords)
+            if mistake is None:
                 raise
-        raise RigtwinError(said)
+        raise RigtwinError(mistake)
 
-    # It is found there, by those too who send it to another process.
-    called.__module__ = "rigtwin"
-    return called  # type: ignore[return-value]
+    # Pickle looks a function up by module and name, and the decorated one is an attribute of the
+    # package, not of the module that defines the plain one.
+    checked.__module__ = "rigtwin"
+    return checked  # type: ignore[return-value]
 
 
 def _mistake(
-    function: Callable[..., Any], values: Sequence[Any], named: Mapping[str, Any]
+    function: Callable[..., Any], values: Sequence[Any], keywords: Mapping[str, Any]
 ) -> str | None:
+    """Return a line about the first argument of a wrong type, or None."""
     signature = inspect.signature(function)
     try:
-        given = signature.bind(*values, **named).arguments
+        arguments = signature.bind(*values, **keywords).arguments
     except TypeError:
+        # An unknown or missing parameter: Python's own message names it.
         return None
-    known = function.__globals__ if inspect.isfunction(function) else {}
-    for name, value in given.items():
+    namespace = function.__globals__ if inspect.isfunction(function) else {}
+    for name, value in arguments.items():
         parameter = signature.parameters[name]
         if parameter.kind in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD):
             continue
-        expected = _meaning(parameter.annotation, known)
+        expected = _evaluate(parameter.annotation, namespace)
         if not fits(value, expected):
             return f"{name} {value!r:.60}: expected {describe(expected)}"
         if isinstance(value, str | Path) and "\0" in str(value):
@@ -78,51 +84,45 @@ def _mistake(
     return None
 
 
-def _meaning(annotation: Any, known: Mapping[str, Any]) -> Any:
-    """What an annotation stands for; anything where that is not known while the program runs."""
+def _evaluate(annotation: Any, namespace: Mapping[str, Any]) -> Any:
+    """Return the type of an annotation; Any if it is imported for type checkers only."""
     if not isinstance(annotation, str):
         return annotation
     try:
-        return eval(annotation, dict(known))
+        return eval(annotation, dict(namespace))
     except NameError:
         return Any
 
 
 def fits(value: Any, expected: Any) -> bool:
-    """Whether a value is of a type, and what it holds of that type's.
+    """Return whether a value and its items are of a type.
 
     Parameters
     ----------
     value
-        Anything.
+        Value to check.
     expected
-        As an annotation has it; what cannot be looked at fits.
+        Type, as an annotation states it. Types that cannot be checked at run time accept any value.
 
     Returns
     -------
     bool
-        No truth value is a number.
+        Whether the value fits. Truth values do not count as numbers.
     """
     kind, inner = get_origin(expected), get_args(expected)
     if kind in (Union, UnionType):
-        return any(fits(value, each) for each in inner)
+        return any(fits(value, option) for option in inner)
     if kind is Literal:
         return value in inner
     if kind is not None and isinstance(kind, type):
-        if issubclass(kind, Callable):  # type: ignore[arg-type]
-            return callable(value)
-        if not isinstance(value, kind) or (isinstance(value, str | bytes) and kind is not str):
-            return False
-        if issubclass(kind, Mapping) and len(inner) == 2:
-            return all(fits(key, inner[0]) and fits(each, inner[1]) for key, each in value.items())
-        if issubclass(kind, Sequence) and not issubclass(kind, tuple) and inner:
-            return all(fits(each, inner[0]) for each in value)
-        return True
+        return _fits_generic(value, kind, inner)
     if expected in (int, float):
         numbers = int if expected is int else int | float
-        whole = getattr(value, "item", None)
-        own = whole() if callable(whole) and getattr(value, "ndim", 1) == 0 else value
-        return isinstance(own, numbers) and not isinstance(own, bool)
+        # NumPy's scalars are not Python numbers; `item` converts them, but also takes the only
+        # element of an array, which is no number here.
+        convert = getattr(value, "item", None)
+        number = convert() if callable(convert) and getattr(value, "ndim", 1) == 0 else value
+        return isinstance(number, numbers) and not isinstance(number, bool)
     if expected is None:
         return value is None
     try:
@@ -131,23 +131,37 @@ def fits(value: Any, expected: Any) -> bool:
         return True
 
 
+def _fits_generic(value: Any, kind: type, inner: tuple[Any, ...]) -> bool:
+    """Return whether a value is of a generic type such as `Sequence[str]`."""
+    if issubclass(kind, Callable):  # type: ignore[arg-type]
+        return callable(value)
+    # A text is a sequence of texts to Python, and never meant as one here.
+    if not isinstance(value, kind) or (isinstance(value, str | bytes) and kind is not str):
+        return False
+    if issubclass(kind, Mapping) and len(inner) == 2:
+        return all(fits(key, inner[0]) and fits(item, inner[1]) for key, item in value.items())
+    if issubclass(kind, Sequence) and not issubclass(kind, tuple) and inner:
+        return all(fits(item, inner[0]) for item in value)
+    return True
+
+
 def describe(expected: Any) -> str:
-    """What a type is called.
+    """Return the name of a type as messages state it.
 
     Parameters
     ----------
     expected
-        As an annotation has it.
+        Type, as an annotation states it.
 
     Returns
     -------
     str
-        In words where there are any.
+        Plain words where `NAMES` has them, else the type's own name.
     """
     kind, inner = get_origin(expected), get_args(expected)
     if kind in (Union, UnionType):
-        *most, last = dict.fromkeys(describe(each) for each in inner)
-        return f"{', '.join(most)} or {last}" if most else last
+        *options, last = dict.fromkeys(describe(option) for option in inner)
+        return f"{', '.join(options)} or {last}" if options else last
     if kind is Literal:
         return " or ".join(map(repr, inner))
     if isinstance(kind, type):

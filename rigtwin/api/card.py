@@ -1,5 +1,5 @@
-"""The data acquisition card: a virtual one on a port, the check of a channel table, lines that a
-dead program holds."""
+"""Data acquisition card: a virtual card on a port, the check of a channel table, the release of
+lines that a dead program holds."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from machines import DEFAULT_MACHINE
-from rigtwin.api.machines import Effects, Settings, effect_texts, the_machine
+from rigtwin.api.machines import Effects, Settings, effect_texts, resolve_machine
 from rigtwin.description.changes import with_changes
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.effects import apply_effects
@@ -44,18 +44,38 @@ PORTS = 65535
 
 @dataclass(frozen=True)
 class TableCheck:
-    """table: as found, signed and dated; rest: what every input read, if that was looked at; said:
-    what was changed, a line each."""
+    """Result of the check of a channel table.
+
+    Attributes
+    ----------
+    table : ChannelTable
+        Corrected table, with operator and date.
+    rest : tuple of RestReading
+        Reading of every input at rest. Empty if neither zero nor span was checked.
+    changes : tuple of str
+        Corrections of signs, one line each.
+    """
 
     table: ChannelTable
     rest: tuple[RestReading, ...]
-    said: tuple[str, ...]
+    changes: tuple[str, ...]
 
 
 @dataclass(frozen=True)
 class ServedCard:
-    """A virtual card that answers on a port of this computer. ticks: how far its clock has come;
-    close: ends it."""
+    """Virtual card on a port of this computer.
+
+    Attributes
+    ----------
+    device : str
+        Name of the card.
+    address : str
+        Host and port, for `card.address` of a channel table.
+    ticks : callable
+        Returns the number of ticks that the twin has run.
+    close : callable
+        Stops the server.
+    """
 
     device: str
     address: str
@@ -72,69 +92,77 @@ def serve_card(
     effects: Effects = (),
     seed: int = 0,
 ) -> ServedCard:
-    """Lets the twin, in real time, be the card of any NI-DAQmx gRPC client on this computer.
+    """Serve a virtual card to NI-DAQmx gRPC clients on this computer; a twin runs behind it.
 
     Parameters
     ----------
     card
-        The channel table: how the twin is wired to the card.
+        Channel table: the wiring between twin and card, TOML.
     machine
-        Whose twin, by name or description.
+        Machine of the twin, or its name, or the path of its description.
     port
-        0 takes a free one.
-    settings, effects
-        Of the twin.
+        Port of the server. 0, the default, takes a free port.
+    settings
+        Changes of the twin's configuration.
+    effects
+        Effects added to the twin.
     seed
-        Of the sensors' noise.
+        Seed of the sensor noise, at least 0.
+
+    Returns
+    -------
+    ServedCard
+        The running server; call its `close` at the end.
 
     Raises
     ------
     RigtwinError
-        For a mistake in these, a port that is taken, or a missing package.
+        For a mistake in an argument, a port in use, or a missing package.
     """
     require_client()
     from rigtwin.hardware.daq.transport import LOCAL, serve
 
     if seed < 0 or not 0 <= port <= PORTS:
         raise RigtwinError(f"seed: expected 0 or more; port: 0 to {PORTS}")
-    on = the_machine(machine)
-    configuration = with_changes(on.configuration, settings)
+    described = resolve_machine(machine)
+    configuration = with_changes(described.configuration, settings)
     actual = apply_effects(configuration, effect_texts(effects))
-    table = load_table(Path(card), on.physics.signals(on))
-    terminals = on.physics.terminals(on, actual, table, seed)
+    table = load_table(Path(card), described.physics.signals(described))
+    terminals = described.physics.terminals(described, actual, table, seed)
     virtual = VirtualCard(terminals, table, RealTime(configuration.timing.period))
-    server, taken = serve(virtual, port)
+    server, open_port = serve(virtual, port)
     return ServedCard(
         table.device,
-        f"{LOCAL}:{taken}",
+        f"{LOCAL}:{open_port}",
         lambda: virtual.tick,
         lambda: server.stop(0.5).wait(),
     )
 
 
 def release_card(card: str | Path, *, machine: Machine | str | Path = DEFAULT_MACHINE) -> bool:
-    """Frees what a program that died has left on a gRPC device server, with all outputs at zero and
-    the power off.
+    """Release the lines that a dead program holds on a gRPC device server.
+
+    All outputs are set to zero and the power is switched off first.
 
     Parameters
     ----------
     card
-        The channel table.
+        Channel table of the card, TOML.
     machine
-        Of which machine, by name or description.
+        Machine on the card, or its name, or the path of its description.
 
     Returns
     -------
     bool
-        Whether anything had been left.
+        Whether any line was held.
 
     Raises
     ------
     RigtwinError
-        If the card has no server.
+        If the channel table names no server.
     """
-    on = the_machine(machine)
-    table = load_table(Path(card), on.physics.signals(on))
+    described = resolve_machine(machine)
+    table = load_table(Path(card), described.physics.signals(described))
     if not table.address:
         raise RigtwinError(
             "card.address is empty: "
@@ -160,53 +188,56 @@ def check_card(
     stop: Callable[[], str | None] | None = None,
     show: Callable[[tuple[RestReading, ...]], object] = lambda _: None,
 ) -> TableCheck:
-    """Finds zero, span and signs of a channel table on the rig as it stands.
+    """Calibrate zero, span and signs of a channel table on the rig in its present state.
 
     Parameters
     ----------
     card
-        The table to begin with.
-    operator, note
-        Who does it, and what is to be kept in the table.
+        Channel table to correct, TOML.
+    operator
+        Name of the person who calibrates. It is stored in the table.
+    note
+        Remark that is stored in the table.
     zero
-        Whether every input reads its reference now.
+        Whether every input is at its reference value now, so that its zero can be set.
     references
-        Input → what it reads with `zero`, in its unit, where that is not zero.
+        Reference values that are not zero: input → value in the input's unit, used with `zero`.
     spans
-        Input → what it reads now.
+        Present values from which the span is set: input → value in the input's unit.
     signs
-        Whether to move each output a little and see which signal follows, and how.
+        Whether to move each output slightly and observe which signals follow.
     stroke
-        m, of the plates, with `signs`.
+        Stroke of the plates in m, used with `signs`, 0.005 by default.
     directions
-        Output → which way it goes, 1 or −1, where that is known.
+        Known direction of motion: output → 1 or -1.
     arm
-        Asks, before anything moves, whether everybody is clear of the rig.
+        Function that asks, before anything moves, whether everybody is clear of the rig.
     ask
-        Asks which way an output went, 1 or −1; not needed of a virtual card.
+        Function that asks in which direction an output moved, 1 or -1. A virtual card needs none.
     virtual
-        The table that a virtual card is wired by, in the rig's place.
+        Channel table by which a virtual card is wired. The check then uses it in place of the rig.
     stop
-        Gives a reason to end the motion; by default it ends at a key or a signal such as Ctrl-C's.
+        Function that returns a reason to end the motion, or None. By default the motion ends at a
+        key, or at a signal such as Ctrl-C's.
     show
-        Called with what the inputs read at rest, as soon as that is known.
+        Function called with the readings at rest as soon as they are known.
 
     Returns
     -------
     TableCheck
-        The table as found; it is not written.
+        Corrected table, which `write_table` writes.
 
     Raises
     ------
     RigtwinError
-        For a mistake in these, an input that is dead, or a motion that was stopped.
+        For a mistake in an argument, a dead input, or a motion that was stopped.
     """
     table = load_table(Path(card))
     if not operator.strip():
         raise RigtwinError("operator is empty: expected who calibrates")
-    given, reads, known = dict(references or {}), dict(spans or {}), dict(directions or {})
-    _require_values(given, "reference", table)
-    _require_values(reads, "span", table)
+    zeros, present, known = dict(references or {}), dict(spans or {}), dict(directions or {})
+    _require_values(zeros, "reference", table)
+    _require_values(present, "span", table)
     if not LEAST_STROKE <= stroke <= MOST_STROKE:
         raise RigtwinError(f"stroke {stroke:g}: expected {LEAST_STROKE:g} to {MOST_STROKE:g} m")
     for name, sign in known.items():
@@ -215,8 +246,8 @@ def check_card(
                 f"moved {name}: expected one of {', '.join(OUTPUTS)} and + or -, such as ground=+"
             )
     require_ranges(table, Configuration().safety)
-    if not (signs or zero or reads):
-        raise RigtwinError("nothing to do: zero, span NAME=VALUE or signs")
+    if not (signs or zero or present):
+        raise RigtwinError("nothing to check: expected zero, span NAME=VALUE or signs")
     wiring = None if virtual is None else load_table(Path(virtual))
 
     def find_direction(output: str) -> int:
@@ -225,34 +256,37 @@ def check_card(
         if wiring is not None:
             return direction_of_wiring(output, table, wiring)
         if ask is None:
-            raise RigtwinError(f"which way {output} went is not known, and nobody was asked")
+            raise RigtwinError(f"direction of {output} is unknown: expected `directions` or `ask`")
         return ask(output)
 
-    said: tuple[str, ...] = ()
-    still: tuple[RestReading, ...] = ()
-    found = table
+    changes: tuple[str, ...] = ()
+    rest: tuple[RestReading, ...] = ()
+    corrected = table
+    # Signs first: zero and span depend on them. The span before the zero: the zero is set at the
+    # corrected span.
     if signs:
         if wiring is None and not arm():
             raise RigtwinError("not armed; nothing moved")
-        with nullcontext(stop) if stop is not None else stop_requests() as asked:
-            responses = move_outputs(table, wiring, stroke, asked)
+        with nullcontext(stop) if stop is not None else stop_requests() as stop_request:
+            responses = move_outputs(table, wiring, stroke, stop_request)
         moved = {output: find_direction(output) for output in OUTPUTS}
-        found, said = correct_signs(table, responses, moved)
-    if zero or reads:
-        still = look_at_rest(found, wiring)
-        show(still)
-        found = set_spans(found, still, reads) if reads else found
-        found = set_zeros(found, still, given) if zero else found
-    require_ranges(found, Configuration().safety)
-    return TableCheck(sign_off(found, operator, note, date.today()), still, said)
+        corrected, changes = correct_signs(table, responses, moved)
+    if zero or present:
+        rest = look_at_rest(corrected, wiring)
+        show(rest)
+        corrected = set_spans(corrected, rest, present) if present else corrected
+        corrected = set_zeros(corrected, rest, zeros) if zero else corrected
+    require_ranges(corrected, Configuration().safety)
+    return TableCheck(sign_off(corrected, operator, note, date.today()), rest, changes)
 
 
 def write_table(table: ChannelTable, path: str | Path) -> None:
-    """Writes a channel table. Raises RigtwinError if it cannot."""
+    """Write a channel table, TOML. Raises RigtwinError if the file cannot be written."""
     atomic_write(Path(path), to_toml(table))
 
 
 def _require_values(values: Mapping[str, float], option: str, table: ChannelTable) -> None:
+    """Refuse a value of an unknown input, or a value that is not finite."""
     names = [line.name for line in table.inputs]
     for name, value in values.items():
         if name not in names or not np.isfinite(value):

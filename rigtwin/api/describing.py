@@ -1,18 +1,20 @@
-"""Machines described from a model and a log, and logs as recordings of them."""
+"""Descriptions made from a model and a log, and logs as recordings of the described machine."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from rigtwin.api.recordings import Recording, faced
+from rigtwin.api.recordings import Recording, with_machine
 from rigtwin.describing.described import MODELS, Described, describe_log
 from rigtwin.errors import RigtwinError
 from rigtwin.recording import reader
 
 Log = str | Path | Sequence[str | Path]
-"""A log, or several files of one that are put side by side; "a.csv+b.csv" is the same."""
-BESIDE = "+"
+"""Log of another program: a file, or several that are put side by side. A text "a.csv+b.csv" names
+two files."""
+SEPARATOR = "+"
+"""Separator of a log's files in one text."""
 
 
 def describe(
@@ -23,34 +25,45 @@ def describe(
     test: str = "",
     out: str | Path | None = None,
 ) -> Described:
-    """Describe a machine from its model and a log of it.
+    """Describe a machine from its model and a log.
+
+    The columns of the log are matched with the joints of the model by name, and their units and
+    signs are checked by inverse dynamics.
 
     Parameters
     ----------
     model
-        MJCF or URDF.
+        File of the mechanics, MJCF or URDF.
     log
         CSV, JSON, MATLAB or parquet file, or several that are put side by side, row by row.
     columns
-        What the log does not state: "elbow.position" → a column with or without sign and unit
-        ("-q2 [deg]"), a formula of columns, or "none"; "*.position" → a unit ("[deg]"); "time" →
-        a column with its unit, or the period in s.
+        Statements about the log that override its reading. "elbow.position" → a column with or
+        without sign and unit ("-q2 [deg]"), a formula of columns, or "none"; "*.position" → a unit
+        ("[deg]"); "time" → a column with its unit, or the period in s.
     test
         Kind of the test: "inverse dynamics", "position commands", "servos" or "force commands".
-        Concluded from the log by default.
+        Defaults to the kind that the columns imply.
     out
-        Folder that the description and the map are written to.
+        Folder in which the description and the map are written, TOML. Defaults to none.
 
     Returns
     -------
     Described
-        The machine, and the table of what was taken for what. `str()` of it is that table;
-        `record()` makes a recording of a log.
+        `machine`, the described machine; `assumptions`, statements that the log does not make;
+        `record(log)`, a log as a recording. `str()` returns the table of the columns and their
+        meaning.
 
     Raises
     ------
     RigtwinError
-        With a question, if two readings of the log are possible.
+        If the log can be read in two ways; the message is the question to answer by `columns` or
+        `test`. Also if the model or a column cannot be read.
+
+    Examples
+    --------
+    >>> described = rigtwin.describe("arm.xml", "log.csv")  # doctest: +SKIP
+    >>> columns = {"elbow.position": "q2 [deg]"}
+    >>> described = rigtwin.describe("arm.xml", "log.csv", columns=columns)  # doctest: +SKIP
     """
     if Path(model).suffix.lower() not in MODELS:
         raise RigtwinError(f"model {model}: expected a name that ends in {', '.join(MODELS)}")
@@ -61,12 +74,12 @@ def describe(
 
 
 def is_model(machine: object) -> bool:
-    """Whether a machine is named by its model, without a description.
+    """Return whether a machine is stated by its model, without a description.
 
     Parameters
     ----------
     machine
-        Anything that names a machine.
+        Value of an argument `machine`.
     """
     return isinstance(machine, str | Path) and Path(machine).suffix.lower() in MODELS
 
@@ -77,7 +90,12 @@ def log_files(log: Log | reader.Recording) -> tuple[Path, ...]:
     Parameters
     ----------
     log
-        A log, or several files of one.
+        A file, several files, or several in one text: "a.csv+b.csv".
+
+    Raises
+    ------
+    RigtwinError
+        For a recording, which needs no description.
     """
     if isinstance(log, reader.Recording):
         raise RigtwinError(
@@ -85,10 +103,10 @@ def log_files(log: Log | reader.Recording) -> tuple[Path, ...]:
             "description of its machine"
         )
     if not isinstance(log, str | Path):
-        return tuple(Path(each) for each in log)
+        return tuple(Path(file) for file in log)
     path = Path(log)
-    if BESIDE in str(log) and not path.exists():
-        parts = tuple(Path(each) for each in str(log).split(BESIDE))
+    if SEPARATOR in str(log) and not path.exists():
+        parts = tuple(Path(file) for file in str(log).split(SEPARATOR))
         if all(part.is_file() for part in parts):
             return parts
     return (path,)
@@ -100,8 +118,8 @@ def record_log(described: Described, log: Log | reader.Recording) -> Recording:
     Parameters
     ----------
     described
-        The machine.
+        Machine with the map of its log.
     log
-        A log with the same columns.
+        Log with the same columns.
     """
-    return faced(described.record(log_files(log)), described.machine)
+    return with_machine(described.record(log_files(log)), described.machine)

@@ -1,4 +1,4 @@
-"""Many recordings, each diagnosed by itself: as one list of jobs, on all cores or on a cluster."""
+"""Independent diagnoses of many recordings, as jobs on all cores or on a cluster."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from rigtwin.api.answers import diagnose
-from rigtwin.api.machines import Settings, machine_of, machines, tables_of, the_machine, twin_of
-from rigtwin.api.recordings import the_recording
+from rigtwin.api.machines import Settings, machine_of, machines, resolve_machine, tables_of, twin_of
+from rigtwin.api.recordings import resolve_recording
 from rigtwin.console import finite
 from rigtwin.description.machine import Machine
 from rigtwin.errors import RigtwinError
@@ -20,16 +20,26 @@ from rigtwin.files import atomic_write, printable
 from rigtwin.studies.sweep import Store, open_workers, run_jobs
 from rigtwin.system import return_memory
 
-KEPT, TABLE = "answers.sqlite", "answers.json"
-"""In the folder: what is done, and all answers together."""
-_HERE = "the-recording-that-is-diagnosed"
-"""Stands in a kept answer for its recording, of which there may be copies of other names."""
+STORE, TABLE = "answers.sqlite", "answers.json"
+"""Files in the folder of the answers: the finished jobs, and all answers together."""
+_PLACEHOLDER = "the-recording-that-is-diagnosed"
+"""Text in a stored answer in place of the recording's path. Answers are stored by content, and the
+same recording may have copies of other names."""
 
 
 @dataclass(frozen=True)
 class Answered:
-    """path: of a recording; document: its answer, as `Diagnosis.document` has it, or None; error:
-    why there is none, in a line."""
+    """Answer about one recording of many.
+
+    Attributes
+    ----------
+    path : Path
+        File of the recording.
+    document : mapping or None
+        Answer as `Diagnosis.document` returns it; None if there is none.
+    error : str
+        Reason why there is no answer, one line. Empty if there is an answer.
+    """
 
     path: Path
     document: Mapping[str, Any] | None
@@ -45,8 +55,17 @@ class Answered:
 
 @dataclass(frozen=True)
 class _Job:
-    """data: of the recording's file, which a worker elsewhere does not have; machine: its
-    description's path, or the name of one that comes along."""
+    """One diagnosis as a job.
+
+    Attributes
+    ----------
+    data : bytes
+        Content of the recording's file, which a worker on another computer cannot read.
+    machine : str
+        Name of a shipped machine, or the path of a description.
+    settings, without
+        Changes and removed effects of the twin, see `diagnose`.
+    """
 
     data: bytes
     machine: str
@@ -55,20 +74,21 @@ class _Job:
 
 
 def _answer(job: _Job) -> dict[str, Any]:
+    """Diagnose one recording. Runs in a worker process."""
     with TemporaryDirectory(prefix="rigtwin-") as folder:
-        path = Path(folder) / _HERE
+        path = Path(folder) / _PLACEHOLDER
         path.write_bytes(job.data)
         try:
-            found = diagnose(
+            document = diagnose(
                 path, machine=job.machine, settings=job.settings, without=job.without
             ).document()
         except RigtwinError as error:
-            return {"error": str(error).replace(str(path), _HERE)}
+            return {"error": str(error).replace(str(path), _PLACEHOLDER)}
         finally:
-            # Or it grows by some MB a recording.
+            # Without this, the process grows by several MB per recording.
             return_memory()
-    told = json.dumps(finite(found), allow_nan=False)
-    return {"answer": told.replace(json.dumps(str(path))[1:-1], _HERE)}
+    text = json.dumps(finite(document), allow_nan=False)
+    return {"answer": text.replace(json.dumps(str(path))[1:-1], _PLACEHOLDER)}
 
 
 def diagnose_each(
@@ -82,36 +102,38 @@ def diagnose_each(
     cluster: str | None = None,
     progress: Callable[[int, int], object] = lambda _done, _all: None,
 ) -> tuple[Answered, ...]:
-    """Diagnoses many recordings, each by itself.
+    """Diagnose many recordings independently.
 
-    What is done is kept in the folder, so that a second call goes on where the first was stopped.
-    A recording that cannot be diagnosed says why, and does not keep the others from it.
+    Finished answers are stored in the folder, so that a second call continues where the first was
+    stopped. A recording that cannot be diagnosed states the reason; the others are not affected.
 
     Parameters
     ----------
     recordings
-        Their paths.
+        Paths of the recordings.
     folder
-        Of the answers: `answers.json` has all of them by path.
+        Folder of the answers. Its `answers.json` has all answers by the recordings' paths.
     machine
-        That they are of; by default the one that each names. Workers of a cluster must have its
-        description, if it is none that comes along, at the same path.
+        Machine of all recordings, or its name, or the path of its description. Defaults to the
+        one named in the recording. Workers of a cluster need a description that is not shipped at
+        the same path.
     settings, without
-        As of `diagnose`.
+        Changes of the twin and effects removed from it, see `diagnose`.
     workers, cluster
-        Processes on this computer, one a core by default; or the address of a dask cluster.
+        Number of processes on this computer, one per core by default; or the address of a dask
+        cluster.
     progress
-        Called with the recordings done and with how many there are.
+        Function called with the number of finished recordings and with their total.
 
     Returns
     -------
     tuple of Answered
-        In the order of the recordings.
+        Answers in the order of the recordings.
 
     Raises
     ------
     RigtwinError
-        If there is no recording, one is named twice, settings or a machine make no sense, or the
+        If there is no recording, one is named twice, settings or machine are invalid, or the
         folder cannot be used.
     """
     paths, out = _paths(recordings), Path(_checked("folder", folder, str | Path, "a path"))
@@ -119,15 +141,15 @@ def diagnose_each(
         raise RigtwinError("folder '': expected a folder for the answers")
     _checked("workers", workers, int | None, "a whole number")
     _checked("cluster", cluster, str | None, "an address, such as tcp://host:8786")
-    if isinstance(without, str) or not all(isinstance(each, str) for each in _list(without)):
+    if isinstance(without, str) or not all(isinstance(name, str) for name in _list(without)):
         raise RigtwinError(f"without {without!r:.60}: expected a list of effects' names")
-    given = tuple(tables_of(settings))
-    on = None if machine is None else the_machine(machine)
+    changes = tuple(tables_of(settings))
+    stated = None if machine is None else resolve_machine(machine)
     try:
-        told = json.dumps([given, sorted(without)], sort_keys=True)
+        options = json.dumps([changes, sorted(without)], sort_keys=True)
     except (TypeError, ValueError):
         raise RigtwinError(f"settings {settings!r:.60}: expected numbers and text") from None
-    sensible: set[Path] = set()
+    validated: set[Path] = set()
     refused: dict[Path, str] = {}
     keys: dict[Path, str] = {}
 
@@ -135,21 +157,21 @@ def diagnose_each(
         for path in paths:
             try:
                 data = path.read_bytes()
-                described = machine_of(the_recording(path)) if on is None else on
+                described = machine_of(resolve_recording(path)) if stated is None else stated
             except (OSError, ValueError) as error:
-                said = getattr(error, "strerror", None) or error
-                refused[path] = f"cannot read {printable(str(path))}: {said}"
+                reason = getattr(error, "strerror", None) or error
+                refused[path] = f"cannot read {printable(str(path))}: {reason}"
             except RigtwinError as error:
                 refused[path] = str(error)
             else:
-                if described.path not in sensible:
-                    # What makes no sense of it makes none of all its recordings.
-                    twin_of(described, given, without)
-                    sensible.add(described.path)
-                keys[path] = _digest(data, told.encode(), *map(Path.read_bytes, described.files))
+                if described.path not in validated:
+                    # Validate the settings once per machine: an invalid one ends the whole call.
+                    twin_of(described, changes, without)
+                    validated.add(described.path)
+                keys[path] = _digest(data, options.encode(), *map(Path.read_bytes, described.files))
                 yield (
                     keys[path],
-                    _Job(data, _name(described), given, tuple(without)),
+                    _Job(data, _name(described), changes, tuple(without)),
                 )
 
     done = 0
@@ -159,70 +181,77 @@ def diagnose_each(
         done += more
         progress(done + len(refused), len(paths))
 
-    with Store(out / KEPT) as store, open_workers(workers, cluster) as several:
-        run_jobs(store, several, _answer, jobs(), count)
+    with Store(out / STORE) as store, open_workers(workers, cluster) as pool:
+        run_jobs(store, pool, _answer, jobs(), count)
         answers = tuple(
             Answered(path, None, refused[path])
             if path in refused
-            else _read(path, store[key], out / KEPT)
+            else _read(path, store[key], out / STORE)
             for path, key in ((path, keys.get(path, "")) for path in paths)
         )
     table = {
-        str(each.path): {"error": each.error} if each.document is None else each.document
-        for each in answers
+        str(answer.path): {"error": answer.error} if answer.document is None else answer.document
+        for answer in answers
     }
     atomic_write(out / TABLE, json.dumps(table, indent=1, allow_nan=False) + "\n")
     return answers
 
 
-def _read(path: Path, result: Any, kept: Path) -> Answered:
+def _read(path: Path, result: Any, store: Path) -> Answered:
+    """Return a stored answer with the recording's path put in. Raises RigtwinError if damaged."""
     try:
         if "error" in result:
-            return Answered(path, None, result["error"].replace(_HERE, printable(str(path))))
-        own = json.dumps(printable(str(path)))[1:-1]
-        document = json.loads(result["answer"].replace(_HERE, own))
+            return Answered(path, None, result["error"].replace(_PLACEHOLDER, printable(str(path))))
+        escaped = json.dumps(printable(str(path)))[1:-1]
+        document = json.loads(result["answer"].replace(_PLACEHOLDER, escaped))
         _ = document["verdict"], document["sentence"]
     except (TypeError, ValueError, KeyError, AttributeError):
         raise RigtwinError(
-            f"{kept} is not a file of answers, or damaged; remove it and run again"
+            f"{store} is not a file of answers, or damaged; remove it and run again"
         ) from None
     return Answered(path, document)
 
 
-def _checked(name: str, given: Any, kinds: Any, expected: str) -> Any:
-    if not isinstance(given, kinds) or isinstance(given, bool):
-        raise RigtwinError(f"{name} {given!r:.60}: expected {expected}")
-    return given
+def _checked(name: str, value: Any, kinds: Any, expected: str) -> Any:
+    """Return an argument. Raises RigtwinError if it has another type than `kinds`."""
+    if not isinstance(value, kinds) or isinstance(value, bool):
+        raise RigtwinError(f"{name} {value!r:.60}: expected {expected}")
+    return value
 
 
-def _list(given: Any) -> list[Any]:
-    return list(given) if isinstance(given, Sequence) else [None]
+def _list(values: Any) -> list[Any]:
+    """Return a sequence as a list. Anything else becomes [None], which no check accepts."""
+    return list(values) if isinstance(values, Sequence) else [None]
 
 
 def _paths(recordings: Any) -> list[Path]:
-    """Raises RigtwinError unless they are some, of which none is there twice."""
-    each = _list(recordings)
-    if isinstance(recordings, str) or not all(isinstance(one, str | Path) for one in each):
+    """Return the recordings' paths. Raises RigtwinError if there are none, or for duplicates."""
+    names = _list(recordings)
+    if isinstance(recordings, str) or not all(isinstance(name, str | Path) for name in names):
         raise RigtwinError(f"recordings {recordings!r:.60}: expected a list of paths")
-    paths = [Path(one) for one in each]
+    paths = [Path(name) for name in names]
     if not paths:
         raise RigtwinError("no recording to diagnose")
-    seen: set[Path] = set()
+    resolved: set[Path] = set()
     for path in paths:
-        whole = path.absolute() if "\0" in str(path) else path.resolve()
-        if whole in seen:
+        # `resolve` refuses a null character, for which reading gives the clearer message.
+        target = path.absolute() if "\0" in str(path) else path.resolve()
+        if target in resolved:
             raise RigtwinError(f"{printable(str(path))} is named twice; each is diagnosed once")
-        seen.add(whole)
+        resolved.add(target)
     return paths
 
 
-def _name(of: Machine) -> str:
-    """By which a worker elsewhere finds it too, if it comes along."""
-    return of.name if machines().get(of.name) == of.path else str(of.path)
+def _name(machine: Machine) -> str:
+    """Return the name of a shipped machine, which other computers have too, or else the path."""
+    shipped = machines().get(machine.name) == machine.path
+    return machine.name if shipped else str(machine.path)
 
 
 def _digest(*parts: bytes) -> str:
+    """Return the key of a job: a hash of all that its answer depends on."""
     digest = hashlib.sha256()
     for part in parts:
+        # The length keeps parts apart that would concatenate to the same bytes.
         digest.update(len(part).to_bytes(8, "little") + part)
     return digest.hexdigest()[:32]

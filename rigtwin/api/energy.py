@@ -1,11 +1,11 @@
-"""How far a hybrid test may be believed."""
+"""Energy error of a hybrid test."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 from rigtwin.api.machines import Settings, described_machine
-from rigtwin.api.recordings import the_recording
+from rigtwin.api.recordings import resolve_recording
 from rigtwin.description.changes import with_changes
 from rigtwin.description.machine import OWN, Machine
 from rigtwin.recording import reader
@@ -19,34 +19,39 @@ def energy_error(
     machine: Machine | str | Path | None = None,
     settings: Settings = (),
 ) -> EnergyError | None:
-    """The energy that the loop of a hybrid test puts into what it emulates: how far the test may be
-    believed.
+    """Return the energy that the loop of a hybrid test adds to the emulated vehicle.
+
+    Delay and control errors of the loop act as negative damping: the larger the energy error, the
+    less the test represents the vehicle (Mosqueda, Stojadinovic and Mahin, J. Struct. Eng. 133,
+    2007).
 
     Parameters
     ----------
     recording
-        Of the suspension rig with its models in the loop.
+        Recording of the suspension rig with its models in the loop, or its path.
     machine
-        That it is of; by default the one that it names.
+        Machine the recording belongs to, or its name, or the path of its description. Defaults to
+        the one named in the recording.
     settings
-        Of a controller of your own that has the rig's models in it, such as one that compensates
-        delay: changes of its experiment's, since the recording does not say them.
+        Changes of the experiment's settings. They are needed for a custom controller that contains
+        the rig's models, whose settings the recording does not state.
 
     Returns
     -------
     EnergyError or None
-        In J, and as a share of what the suspension's damper took up; None for other tests and other
-        machines, and for a controller of your own without its settings.
+        Energy in J, and as a share of the energy that the suspension's damper dissipated. None for
+        other tests and other machines, and for a custom controller without settings.
 
     Raises
     ------
     RigtwinError
         If a channel is missing, or the recording's settings are unknown.
     """
-    recording = the_recording(recording)
-    found = described_machine(recording, machine)
-    own = OWN in recording.controller and bool(settings)
-    known = experiments_of(found)
+    recording = resolve_recording(recording)
+    described = described_machine(recording, machine)
+    custom = OWN in recording.controller and bool(settings)
+    known = experiments_of(described)
     start = known[recording.experiment].configuration if recording.experiment in known else None
-    base = with_changes(start or found.configuration, settings)
-    return found.physics.energy_error(recording, found.configuration_of(recording, base), own)
+    base = with_changes(start or described.configuration, settings)
+    configuration = described.configuration_of(recording, base)
+    return described.physics.energy_error(recording, configuration, custom)

@@ -1,4 +1,4 @@
-"""Faults in sessions on the virtual card."""
+"""Campaign of faults in sessions on the virtual card."""
 
 from __future__ import annotations
 
@@ -21,12 +21,24 @@ from rigtwin.hardware.faults.processes import try_process_fault
 from rigtwin.hardware.session.custom_controller import ControllerFactory, custom_controller
 
 MOST = 1000
+"""Largest number of sessions per kind of fault."""
 
 
 @dataclass(frozen=True)
 class Campaign:
-    """What faults did in sessions on the virtual card. undone: those that this computer could not
-    run, in words; drawn: how many there were to be; interrupted: whether somebody ended it."""
+    """Results of faults in sessions on the virtual card.
+
+    Attributes
+    ----------
+    results : tuple of FaultResult
+        Outcome of every session.
+    undone : tuple of str
+        Sessions that this computer could not run, with the reason.
+    drawn : int
+        Number of planned sessions.
+    interrupted : bool
+        Whether the user ended the campaign early.
+    """
 
     results: tuple[FaultResult, ...]
     undone: tuple[str, ...]
@@ -35,60 +47,74 @@ class Campaign:
 
     @property
     def failed(self) -> tuple[FaultResult, ...]:
-        """Those whose session did not end as it must."""
+        """Results of sessions that were not stopped as required."""
         return tuple(result for result in self.results if not result.ok)
 
 
 def faults(
     *,
     seed: int = 0,
-    each: int = 11,
-    processes: int = 4,
+    per_kind: int = 11,
+    per_process_kind: int = 4,
     card: str | Path = CARD,
     controller: ControllerFactory | None = None,
     settings: Settings = (),
     progress: Callable[[str, int, int], object] = lambda *_: None,
 ) -> Campaign:
-    """Puts faults into sessions on the virtual card, and sees whether each is stopped.
+    """Inject faults into sessions on the virtual card, and check that every session is stopped.
 
-    Interrupted, it gives back what was done.
+    After an interruption (Ctrl-C) the results so far are returned.
 
     Parameters
     ----------
     seed
-        Of the faults' times, tests and places.
-    each, processes
-        Sessions of each kind in one process, and of each kind that kills a process.
+        Seed of the faults' times, tests and places, at least 0.
+    per_kind
+        Number of sessions for each kind of fault within one process, 0 to 1000.
+    per_process_kind
+        Number of sessions for each kind of fault that kills or stops a process, 0 to 1000.
     card
-        The channel table.
+        Channel table, TOML. Defaults to the shipped one.
     controller
-        A function of a test's configuration that makes one of your own instead of the rig's, in the
-        sessions that no process is killed in.
+        Function of a test's configuration that returns a custom controller. It is used in the
+        sessions in which no process is killed.
     settings
-        Changes of every session's settings, such as a compensator of the plate.
+        Changes of every session's settings, such as a compensator of the plate's delay.
     progress
-        Called with the kind that begins, the faults done and how many there are.
+        Function called with the kind of the next fault, the number of finished faults and their
+        total.
+
+    Returns
+    -------
+    Campaign
+        Outcome of every session.
 
     Raises
     ------
     RigtwinError
-        For a number or a setting that makes no sense, a mistake in the table, or a missing package.
+        For a number out of range, an invalid setting, a mistake in the table, or a missing package.
     """
     require_client()
     if seed < 0:
         raise RigtwinError(f"seed {seed}: expected 0 or more")
-    for name, number in {"each": each, "processes": processes}.items():
+    for name, number in {
+        "per_kind (--each)": per_kind,
+        "per_process_kind (--processes)": per_process_kind,
+    }.items():
         if not 0 <= number <= MOST:
             raise RigtwinError(f"{name} {number}: expected 0 to {MOST}")
-    if each == processes == 0:
-        raise RigtwinError("each 0, processes 0: no session to run; expected 1 or more of one")
+    if per_kind == per_process_kind == 0:
+        raise RigtwinError(
+            "no session to run: expected per_kind (--each) or per_process_kind (--processes)"
+        )
     channels = load_table(Path(card))
-    own = None if controller is None else custom_controller(controller)
-    todo = _draw(seed, each, processes)
+    custom = None if controller is None else custom_controller(controller)
+    todo = _draw(seed, per_kind, per_process_kind)
     tests = {
-        name: replace(found, configuration=with_changes(found.configuration, settings))
-        for name, found in ((fault.experiment, find(fault.experiment)) for fault in todo)
+        name: replace(test, configuration=with_changes(test.configuration, settings))
+        for name, test in ((fault.experiment, find(fault.experiment)) for fault in todo)
     }
+    # Settings that the controller refuses are found before the first session starts.
     for test in tests.values():
         set_up(test.configuration.controller, test.configuration.timing.period)
     results, undone, interrupted = list[FaultResult](), list[str](), False
@@ -96,12 +122,12 @@ def faults(
         try:
             for number, fault in enumerate(todo):
                 progress(fault.kind.name, number, len(todo))
-                asked = fault, tests[fault.experiment], channels, Path(folder)
+                session = fault, tests[fault.experiment], channels, Path(folder)
                 try:
                     if fault.kind.place == "process":
-                        results.append(try_process_fault(*asked))
+                        results.append(try_process_fault(*session))
                     else:
-                        results.append(try_fault(*asked, own))
+                        results.append(try_fault(*session, custom))
                 except RigtwinError as error:
                     undone.append(f"{fault.kind.name}, seed {fault.seed}: {error}")
         except KeyboardInterrupt:
@@ -110,10 +136,11 @@ def faults(
     return Campaign(tuple(results), tuple(undone), len(todo), interrupted)
 
 
-def _draw(seed: int, each: int, processes: int) -> list[InjectedFault]:
-    here = [kind for kind in KINDS if kind.place != "process"]
-    apart = [kind for kind in KINDS if kind.place == "process"]
+def _draw(seed: int, per_kind: int, per_process_kind: int) -> list[InjectedFault]:
+    """Draw the faults of a campaign, those within one process first."""
+    within = [kind for kind in KINDS if kind.place != "process"]
+    killing = [kind for kind in KINDS if kind.place == "process"]
     return [
-        *draw_faults(each * len(here), seed, here),
-        *draw_faults(processes * len(apart), seed + 1, apart),
+        *draw_faults(per_kind * len(within), seed, within),
+        *draw_faults(per_process_kind * len(killing), seed + 1, killing),
     ]

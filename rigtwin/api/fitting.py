@@ -1,4 +1,4 @@
-"""Values of effects that are already suspected."""
+"""Values of effects that are named in advance."""
 
 from __future__ import annotations
 
@@ -35,25 +35,30 @@ def fit(
     Parameters
     ----------
     recordings
-        One recording, or several that are explained together, or their paths. Logs of other
-        programs where `machine` is a model.
+        Recording, or several of one machine that are fitted jointly, or their paths. If `machine`
+        is a model, these are logs of other programs.
     effects
-        Names such as "coulomb@elbow"; `effects(machine)` lists them.
+        Name of an effect such as "coulomb@elbow", or several; `effects(machine)` lists them.
     machine
-        Machine the recordings belong to. Defaults to the one that the first recording names.
+        Machine the recordings belong to, or its name, or the path of its description. Defaults to
+        the one named in the first recording. A model (MJCF or URDF) is described from the first
+        log, see `describe`.
     held_out
-        Recordings that the values are judged on and not fitted to.
+        Recordings of the same machine on which the values are judged. They are not fitted.
     settings
         Changes of the twin's plant and of `timing.timestep` before the fit.
     columns, test
-        What a log does not state, see `describe`; for a machine that is a model.
+        Statements about a log as `describe` takes them. They require a model as the machine.
     progress
-        Called with 1 after each fit.
+        Function called with 1 after each fit.
 
     Returns
     -------
     EffectFit
-        Values with intervals, covariance, errors before and after, and warnings.
+        `fitted["coulomb@elbow"]` has the value, its 95 % interval and its unit; `covariance` has
+        shape (parameters, parameters). `error_before` and `error_after` are each recording's
+        residual as a share of the signals' swing, `warnings` state what is confounded, and
+        `save_mjcf(path)` writes the model with the values.
 
     Raises
     ------
@@ -66,19 +71,19 @@ def fit(
     >>> fitted["coulomb@elbow"].value  # doctest: +SKIP
     0.6001
     """
-    given = read_inputs(recordings, machine, held_out, columns, test)
+    inputs = read_inputs(recordings, machine, held_out, columns, test)
     names = [effects] if isinstance(effects, str) else list(effects)
     if not all(isinstance(name, str) for name in names):
         raise RigtwinError(f"effects {effects!r:.60}: expected names such as 'coulomb@rail'")
-    chosen = find_effects(given.machine, names)
-    base = twin_of(given.machine, settings)
+    chosen = find_effects(inputs.machine, names)
+    base = twin_of(inputs.machine, settings)
 
-    def gather(several: Sequence[reader.Recording]) -> Evidence | None:
-        configurations = [given.machine.configuration_of(each, base) for each in several]
-        for recording, configuration in zip(several, configurations, strict=True):
-            require_fit(given.machine, recording, configuration)
-        return Evidence(given.machine, several, configurations) if several else None
+    def gather(tests: Sequence[reader.Recording]) -> Evidence | None:
+        configurations = [inputs.machine.configuration_of(test, base) for test in tests]
+        for recording, configuration in zip(tests, configurations, strict=True):
+            require_fit(inputs.machine, recording, configuration)
+        return Evidence(inputs.machine, tests, configurations) if tests else None
 
-    evidence = gather(given.recordings)
+    evidence = gather(inputs.recordings)
     assert evidence is not None
-    return fit_effects(evidence, chosen, gather(given.held_out), progress)
+    return fit_effects(evidence, chosen, gather(inputs.held_out), progress)

@@ -1,4 +1,4 @@
-"""A recording beside its twin, to move effects by hand."""
+"""A recording beside its twin, whose effects are adjusted by hand."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rigtwin.api.machines import Settings, described_machine, twin_of
-from rigtwin.api.recordings import load, the_recording
+from rigtwin.api.recordings import load, resolve_recording
 from rigtwin.api.watching import PATIENCE, watch
 from rigtwin.description.machine import Machine
 from rigtwin.errors import RigtwinError
@@ -29,32 +29,42 @@ def look(
     settings: Settings = (),
     without: Sequence[str] = (),
 ) -> Look:
-    """A recording beside its twin, whose effects can be moved, fitted and saved.
+    """Return a recording beside its twin, whose effects can be adjusted, fitted and saved.
 
     Parameters
     ----------
     recording
-        The data.
+        Recording, or its path.
     machine
-        That it is of; by default the one that it names.
+        Machine the recording belongs to, or its name, or the path of its description. Defaults to
+        the one named in the recording.
     settings
-        Changes of the twin that it is compared with: of its plant and `timing.timestep`.
+        Changes of the twin before the comparison: of its plant and `timing.timestep`. All other
+        settings are the recording's own.
     without
-        Effects that are taken out of the twin first, such as "coulomb@rail".
+        Effects of the nominal machine that are removed from the twin first, such as
+        "coulomb@rail".
 
     Returns
     -------
     Look
-        The candidate effects, and what the twin with any of them predicts.
+        `effects`, the effects that can be adjusted; `nominal`, the twin's prediction without any;
+        `predict(values)`, `fit(names)` and `save(path, values)` predict, fit and save a twin with
+        effects. `show_look` opens it in the browser.
 
     Raises
     ------
     RigtwinError
-        Naming every fault of the data that makes a comparison meaningless.
+        If the data make a comparison meaningless; the message names every fault.
+
+    Examples
+    --------
+    >>> view = rigtwin.look("rig.mcap")  # doctest: +SKIP
+    >>> view.predict({"coulomb@rail": [80.0]}).percent  # doctest: +SKIP
     """
-    recording = the_recording(recording)
-    found = described_machine(recording, machine)
-    return Look(found, recording, twin_of(found, settings, without))
+    recording = resolve_recording(recording)
+    described = described_machine(recording, machine)
+    return Look(described, recording, twin_of(described, settings, without))
 
 
 def show_look(
@@ -64,36 +74,38 @@ def show_look(
     diagnosis: str | Path | None = None,
     save_twin: str | Path | None = None,
 ) -> Page:
-    """A look in the browser: the machine and its twin in motion, traces, a slider for each effect.
+    """Show a look in the browser: machine and twin in motion, traces, a slider for each effect.
 
     Parameters
     ----------
     look
-        What `look` gave.
+        Result of `look`.
     port
-        Of this computer, which alone reaches the page; 0 takes a free one.
+        Port of the page on this computer; other computers cannot reach it. 0, the default, takes a
+        free port.
     diagnosis
-        JSON of a diagnosis of the same recording, with whose effects the page begins.
+        JSON file of a diagnosis of the same recording. The page starts with its effects.
     save_twin
-        What the page's save button writes; by default a file in the working folder named after
-        the recording.
+        File that the page's save button writes, TOML. Defaults to RECORDING_twin.toml in the
+        working folder.
 
     Returns
     -------
     Page
-        Open at its `url` until its `close` is called; `wait` returns then.
+        Page at `url`, open until its `close` is called; `wait` blocks until then.
 
     Raises
     ------
     RigtwinError
-        If the port is taken, the diagnosis is none of this recording, or viser is missing.
+        If the port is in use, the diagnosis is of another recording, or the package viser is
+        missing.
     """
-    given = None if diagnosis is None else read_diagnosis(diagnosis, look)
+    start = None if diagnosis is None else read_diagnosis(diagnosis, look)
     with _needs_viser():
         from rigtwin.looking.local_server import open_server
         from rigtwin.looking.page import Page
     server = open_server(port, f"{look.machine.title}: {look.recording.path.name}")
-    return Page(server, look, given, _twin_file(look.recording.path, save_twin))
+    return Page(server, look, start, _twin_file(look.recording.path, save_twin))
 
 
 def show_live(
@@ -105,34 +117,35 @@ def show_live(
     without: Sequence[str] = (),
     patience: float = PATIENCE,
     save_twin: str | Path | None = None,
-    said: Callable[[str], object] = lambda _: None,
+    on_message: Callable[[str], object] = lambda _: None,
 ) -> LivePage:
-    """A test that is running beside its twin, in the browser: both in motion, the gap as it arises,
-    an alarm when it is more than noise and tolerances explain. When the test is over, the page
-    becomes that of `show_look`.
+    """Show a running test beside its twin in the browser.
+
+    The page shows both in motion and the gap as it develops, and raises an alarm when the gap
+    exceeds what noise and tolerances explain. After the test it becomes the page of `show_look`.
 
     Parameters
     ----------
     path
-        Of the recording, which another program writes or is about to.
+        File of the recording, which another program is writing or will write.
     port, save_twin
-        As `show_look` takes them.
+        Port of the page and file of its save button, see `show_look`.
     machine, settings, without, patience
-        As `watch` takes them.
-    said
-        Called with what there is to say, a line each: an alarm, its suspects, why the watch ended
-        early.
+        Machine, twin and waiting time, see `watch`.
+    on_message
+        Function called with one line for the operator: an alarm, its suspects, or the reason why
+        the watch ended early.
 
     Returns
     -------
     LivePage
-        Open at its `url` until its `close` is called; `wait` returns then, and raises what went
-        wrong with the recording.
+        Page at `url`, open until its `close` is called. `wait` blocks until then and raises the
+        error that ended the watch, if any.
 
     Raises
     ------
     RigtwinError
-        If the port is taken or viser is missing.
+        If the port is in use or the package viser is missing.
     """
     with _needs_viser():
         from rigtwin.looking.live import LivePage
@@ -145,23 +158,25 @@ def show_live(
             machine=machine,
             settings=settings,
             without=without,
-            told=on_update,
+            on_update=on_update,
             patience=patience,
             stop=stop,
         )
 
     def look_back(server: LocalServer, watched: Watch) -> Page:
-        whole = look(
+        # While the test ran, only its last seconds were held in memory.
+        complete = look(
             load(path, machine), machine=watched.machine, settings=settings, without=without
         )
-        given = None if watched.alarm is None else from_alarm(watched.alarm, whole)
-        return Page(server, whole, given, _twin_file(Path(path), save_twin))
+        start = None if watched.alarm is None else from_alarm(watched.alarm, complete)
+        return Page(server, complete, start, _twin_file(Path(path), save_twin))
 
-    return LivePage(open_server(port, Path(path).name), follow, look_back, said)
+    return LivePage(open_server(port, Path(path).name), follow, look_back, on_message)
 
 
 @contextmanager
 def _needs_viser() -> Iterator[None]:
+    """Turn a missing optional package into one line that says how to install it."""
     try:
         yield
     except ModuleNotFoundError as error:
@@ -170,5 +185,5 @@ def _needs_viser() -> Iterator[None]:
         raise RigtwinError(f"the page needs {error.name}; pip install 'rigtwin[look]'") from None
 
 
-def _twin_file(recording: Path, named: str | Path | None) -> Path:
-    return Path(f"{recording.stem}_twin.toml") if named is None else Path(named)
+def _twin_file(recording: Path, save_twin: str | Path | None) -> Path:
+    return Path(f"{recording.stem}_twin.toml") if save_twin is None else Path(save_twin)

@@ -1,4 +1,4 @@
-"""Machines by name or file, their experiments and effects, and the twin of one."""
+"""Machines by name or file, their experiments and effects, and the twin of a machine."""
 
 from __future__ import annotations
 
@@ -11,73 +11,107 @@ from rigtwin.components.cylinder import told_settings
 from rigtwin.description import catalogue
 from rigtwin.description.changes import POSTERIOR, Changes, read_toml, values_of, with_changes
 from rigtwin.description.configuration import Configuration, parameters
-from rigtwin.description.effects import apply_effects
-from rigtwin.description.effects import without_effect as take_out
+from rigtwin.description.effects import apply_effects, without_effect
 from rigtwin.description.machine import Machine
 from rigtwin.errors import RigtwinError
 from rigtwin.recording import reader
 from rigtwin.simulation.experiment import Experiment, experiments_of
 
 Settings = Changes | Sequence[Changes]
-"""Group → name → value, {"rail": {"coulomb": 60}, "timing": {"duration": 5}}; or the path of a TOML
-file that holds them; or several of these, one over the other."""
+"""Changes of settings: group → name → value, such as {"rail": {"coulomb": 60}, "timing":
+{"duration": 5}}; or the path of a TOML file with such tables; or a sequence of both, of which a
+later entry overrides an earlier one."""
 Effects = Mapping[str, float | Mapping[str, float]] | Sequence[str]
-"""Effect → magnitude, or → parameter → value: {"coulomb@rail": 80}; or texts as `--effect`
-takes."""
+"""Effects with their values: effect → magnitude, such as {"coulomb@rail": 80}; or effect →
+parameter → value; or texts in the form of the option `--effect`, such as "coulomb@rail=80"."""
 
 
 def machine(name: str | Path) -> Machine:
-    """A machine.
+    """Return a machine.
 
     Parameters
     ----------
     name
-        Of a shipped one, see `machines`, or the path of a description, a TOML file.
+        Name of a shipped machine (`machines()` lists them), or the path of a description, a TOML
+        file (docs/machines.md).
+
+    Returns
+    -------
+    Machine
+        The machine, with its components, its plant (nominal parameters in SI units), its
+        experiments and its controller.
 
     Raises
     ------
     RigtwinError
-        With the first mistake in the description, or with what there is.
+        If no machine has this name (the message lists the shipped ones), or if the description
+        has mistakes (the message states the first; `rigtwin machine check` prints all).
+
+    Examples
+    --------
+    >>> import rigtwin
+    >>> rigtwin.machine("emps").name
+    'emps'
+    >>> rig = rigtwin.machine("my_machine.toml")  # doctest: +SKIP
     """
     return catalogue.find(str(name))
 
 
-def the_machine(given: Machine | str | Path) -> Machine:
-    """A machine, or the one of that name or description; raises as `machine` does."""
-    if isinstance(given, Machine):
-        return given
-    if isinstance(given, str | Path):
-        return machine(given)
-    raise RigtwinError(f"{given!r:.60}: expected a machine, its name, or its description's path")
+def resolve_machine(machine: Machine | str | Path) -> Machine:
+    """Return the machine that an argument names.
 
-
-def machines() -> dict[str, Path]:
-    """The machines that come along: name → description."""
-    return catalogue.shipped()
-
-
-def machine_of(recording: reader.Recording) -> Machine:
-    """Return the machine of a recording: the one that was said, the description that the recording
-    remembers, or the shipped machine of that name.
+    Parameters
+    ----------
+    machine
+        Machine, or its name, or the path of its description.
 
     Raises
     ------
     RigtwinError
-        If the machine has to be said.
+        If the argument has another type, and where `machine` raises it.
+    """
+    if isinstance(machine, Machine):
+        return machine
+    if isinstance(machine, str | Path):
+        return catalogue.find(str(machine))
+    raise RigtwinError(f"{machine!r:.60}: expected a machine, its name, or its description's path")
+
+
+def machines() -> dict[str, Path]:
+    """Return the shipped machines.
+
+    Returns
+    -------
+    dict
+        Name → path of the description.
+    """
+    return catalogue.shipped()
+
+
+def machine_of(recording: reader.Recording) -> Machine:
+    """Return the machine of a recording.
+
+    In this order: the machine with which the recording was loaded, the description that the
+    recording refers to, the shipped machine that the recording names.
+
+    Raises
+    ------
+    RigtwinError
+        If none of these exists, so that the machine has to be stated.
     """
     described = getattr(recording, "described", None)
     if described is not None:
         return described
-    remembered = recording.description
-    if remembered is not None and remembered.is_file():
-        found = catalogue.find(str(remembered))
-        if found.name == recording.machine:
-            return found
-        why = f"but {remembered}, which it remembers, describes {found.name!r}"
+    description = recording.description
+    if description is not None and description.is_file():
+        resolved = catalogue.find(str(description))
+        if resolved.name == recording.machine:
+            return resolved
+        why = f"but its description {description} describes {resolved.name!r}"
     elif recording.machine in catalogue.shipped():
         return catalogue.find(recording.machine)
-    elif remembered is not None:
-        why = f"but its description {remembered} does not exist any more"
+    elif description is not None:
+        why = f"but its description {description} does not exist any more"
     else:
         why = f"which is none of the shipped ones, {', '.join(catalogue.shipped())}"
     raise RigtwinError(
@@ -86,38 +120,92 @@ def machine_of(recording: reader.Recording) -> Machine:
     )
 
 
-def described_machine(recording: reader.Recording, given: Machine | str | Path | None) -> Machine:
-    """The machine that was said, or the one that a recording names."""
-    return machine_of(recording) if given is None else the_machine(given)
+def described_machine(recording: reader.Recording, machine: Machine | str | Path | None) -> Machine:
+    """Return the stated machine, or the recording's own one if `machine` is None."""
+    return machine_of(recording) if machine is None else resolve_machine(machine)
 
 
-def experiments(of: Machine | str | Path) -> dict[str, Experiment]:
-    """The experiments that a machine's description names: name → experiment."""
-    return experiments_of(the_machine(of))
+def experiments(machine: Machine | str | Path) -> dict[str, Experiment]:
+    """Return the experiments that a machine's description defines.
+
+    Parameters
+    ----------
+    machine
+        Machine, its name, or the path of its description.
+
+    Returns
+    -------
+    dict
+        Name → experiment: a summary, a configuration and the demands of every tick. `run` takes
+        either the name or the experiment.
+
+    Raises
+    ------
+    RigtwinError
+        If the machine is unknown or its description has mistakes.
+
+    Examples
+    --------
+    >>> import rigtwin
+    >>> "drop" in rigtwin.experiments("suspension-rig")
+    True
+    """
+    return experiments_of(resolve_machine(machine))
 
 
-def effects(of: Machine | str | Path) -> list[Effect]:
-    """All effects that a machine can have."""
-    return list(the_machine(of).effects())
+def effects(machine: Machine | str | Path) -> list[Effect]:
+    """Return all effects that a machine can have.
+
+    Parameters
+    ----------
+    machine
+        Machine, its name, or the path of its description.
+
+    Returns
+    -------
+    list of Effect
+        Effects in the order of the components. `name` is the text that `run`, `fit` and
+        `diagnose` use, such as "coulomb@rail"; `quantities()` states unit and bounds of every
+        parameter.
+
+    Raises
+    ------
+    RigtwinError
+        If the machine is unknown or its description has mistakes.
+
+    Examples
+    --------
+    >>> import rigtwin
+    >>> "coulomb@rail" in [effect.name for effect in rigtwin.effects("suspension-rig")]
+    True
+    """
+    return list(resolve_machine(machine).effects())
 
 
-def effect_texts(given: Effects) -> list[str]:
-    """Effects as `--effect` takes them: `coulomb@rail=80`."""
+def effect_texts(effects: Effects) -> list[str]:
+    """Return effects in the form of the option `--effect`: `coulomb@rail=80`.
+
+    Raises
+    ------
+    RigtwinError
+        If an effect has no value, or for any other type.
+    """
     try:
-        if isinstance(given, Mapping):
-            return [f"{name}={_values(value)}" for name, value in given.items()]
-        texts = [given] if isinstance(given, str) else list(given)
-        if all(isinstance(each, str) for each in texts):
-            return [_require_value(each) for each in texts]
+        if isinstance(effects, Mapping):
+            return [f"{name}={_values(value)}" for name, value in effects.items()]
+        texts = [effects] if isinstance(effects, str) else list(effects)
+        if all(isinstance(text, str) for text in texts):
+            return [_require_value(text) for text in texts]
     except (TypeError, ValueError):
+        # The common message below shows both accepted forms.
         pass
     raise RigtwinError(
-        f"effects {given!r:.60}: expected {{'coulomb@rail': 80}}, or texts as 'coulomb@rail=80'"
+        f"effects {effects!r:.60}: expected {{'coulomb@rail': 80}}, or texts as 'coulomb@rail=80'"
     )
 
 
 def _require_value(text: str) -> str:
-    """An effect as text. Raises RigtwinError if it has no value."""
+    """Return an effect's text. Raises RigtwinError if it has no value."""
     if "=" not in text:
         raise RigtwinError(
             f"effect {text!r:.60} has no value; expected KIND@COMPONENT=VALUE, such as "
@@ -127,79 +215,89 @@ def _require_value(text: str) -> str:
 
 
 def _values(value: float | Mapping[str, float]) -> str:
+    """Return an effect's values as text; the first parameter's name is left out."""
     if not isinstance(value, Mapping):
         return repr(float(value))
-    first, *more = value.items()
-    return ",".join([repr(float(first[1])), *(f"{name}={each!r}" for name, each in more)])
+    first, *rest = value.items()
+    return ",".join([repr(float(first[1])), *(f"{name}={number!r}" for name, number in rest)])
 
 
 def twin_of(
-    of: Machine,
+    machine: Machine,
     settings: Settings = (),
-    taken_out: Sequence[str] = (),
+    removed: Sequence[str] = (),
     effects: Sequence[str] = (),
 ) -> Configuration:
-    """The twin that recordings are compared with.
+    """Return the configuration of the twin that recordings are compared with.
 
     Parameters
     ----------
-    of
-        The machine.
+    machine
+        Machine of the twin.
     settings
-        Changes of its plant or of `timing.timestep`; all other settings are a recording's own.
-    taken_out
-        Effects that the nominal machine has and the twin is not to have.
+        Changes of the plant or of `timing.timestep`. All other settings are the recording's own.
+    removed
+        Effects of the nominal machine that are removed from the twin.
     effects
-        That the twin is given.
+        Effects added to the twin, `KIND@COMPONENT=VALUE`.
 
     Raises
     ------
     RigtwinError
-        For any other setting, or an effect that is not there.
+        If another setting changes, or an effect does not exist.
     """
-    base = with_changes(of.configuration, list(tables_of(settings)))
-    told = set(_told(settings))
-    for (key, value, _), (_, described, _) in zip(
-        parameters(base), parameters(of.configuration), strict=True
+    base = with_changes(machine.configuration, list(tables_of(settings)))
+    stated = set(_named_settings(settings))
+    for (key, value, _), (_, nominal, _) in zip(
+        parameters(base), parameters(machine.configuration), strict=True
     ):
         group, _, name = key.partition(".")
-        own = group in of.plant._fields or (
-            group == "controller" and of.physics.compares_controller
+        allowed = (
+            group in machine.plant._fields
+            or (group == "controller" and machine.physics.compares_controller)
+            or (group, name) == ("timing", "timestep")
         )
-        other = key in told or value != described
-        if other and not own and (group, name) != ("timing", "timestep"):
+        # A setting that repeats the nominal value is refused too if it was named: silently
+        # accepting it would suggest that it has an effect.
+        changes = key in stated or value != nominal
+        if changes and not allowed:
             raise RigtwinError(
                 f"{key}: a comparison changes the plant and timing.timestep only; "
                 "all other settings are the recording's own"
             )
-    for name in taken_out:
-        base = take_out(base, name)
+    for name in removed:
+        base = without_effect(base, name)
     return apply_effects(base, effects)
 
 
 def names_of(argument: str, names: Sequence[str]) -> list[str]:
-    """Names of effects as an argument gives them. Raises RigtwinError for anything but a list of
-    texts."""
+    """Return the effects' names of an argument as a list.
+
+    Raises
+    ------
+    RigtwinError
+        For anything but a list of texts. The message names `argument`.
+    """
     if isinstance(names, str) or not all(isinstance(name, str) for name in names):
         raise RigtwinError(f"{argument} {names!r:.60}: expected a list of effects' names")
     return list(names)
 
 
 def require_unrecorded(
-    settings: Settings, of: Machine, recordings: Sequence[reader.Recording]
+    settings: Settings, machine: Machine, recordings: Sequence[reader.Recording]
 ) -> None:
-    """Refuse controller settings that have no effect, as the recordings state their own.
+    """Refuse controller settings that have no effect because the recordings state their own.
 
     Raises
     ------
     RigtwinError
         For a setting that is named one by one and that a recording of the machine states.
     """
-    for key in _told(settings):
+    for key in _named_settings(settings):
         group, _, name = key.partition(".")
         for recording in recordings:
-            own = recording.machine == of.name and name in recording.controller
-            if group == "controller" and own:
+            recorded = recording.machine == machine.name and name in recording.controller
+            if group == "controller" and recorded:
                 raise RigtwinError(
                     f"{key}: {recording.path} states {recording.controller[name]} for it, and the "
                     "recording's own settings hold; expected settings of the plant, or "
@@ -207,13 +305,17 @@ def require_unrecorded(
                 )
 
 
-class _Written(dict[str, Any]):
-    """Tables of a file, which may hold all settings that there are."""
+class _FileTables(dict[str, Any]):
+    """Tables read from a file.
+
+    A file may hold every setting of a machine, of which a comparison uses the plant's. So its
+    settings do not count as named one by one (`_named_settings`).
+    """
 
 
-def _told(settings: Settings) -> Iterator[str]:
-    """The settings that are named one by one."""
-    if isinstance(settings, _Written):
+def _named_settings(settings: Settings) -> Iterator[str]:
+    """Yield `group.name` of all settings that the caller names one by one, not in a file."""
+    if isinstance(settings, _FileTables):
         return
     if isinstance(settings, Mapping):
         for group, values in settings.items():
@@ -221,38 +323,42 @@ def _told(settings: Settings) -> Iterator[str]:
                 f"{group}.{name}" for name in (values if isinstance(values, Mapping) else ())
             )
     elif isinstance(settings, Sequence) and not isinstance(settings, str | bytes):
-        for each in settings:
-            yield from _told(each)  # type: ignore[arg-type]
+        for entry in settings:
+            yield from _named_settings(entry)  # type: ignore[arg-type]
 
 
 def tables_of(settings: Settings) -> Iterator[Mapping[str, Any]]:
-    """Settings as tables, the files that they may stand in read.
+    """Yield settings as tables; files are read.
 
-    What a calibrated twin's file tells the controller of the plant is left out: it is of tests to
-    come, not of those that are recorded.
+    Settings by which a calibrated twin's file informs the controller about the plant are left out.
+    They hold for later tests: the controller of a recorded test did not have them.
 
     Raises
     ------
     RigtwinError
-        For anything but tables and files of them.
+        For anything but tables and files of tables.
     """
     if isinstance(settings, str | Path):
-        yield _Written(read_toml(Path(settings), _of_the_plant))
+        yield _FileTables(read_toml(Path(settings), _without_told_settings))
     elif isinstance(settings, Mapping):
         yield settings
     elif isinstance(settings, Sequence) and not isinstance(settings, bytes):
-        for each in settings:
-            yield from tables_of(each)  # type: ignore[arg-type]
+        for entry in settings:
+            yield from tables_of(entry)  # type: ignore[arg-type]
     else:
         raise RigtwinError(
             f"settings {settings!r:.60}: expected tables of settings, or the paths of files"
         )
 
 
-def _of_the_plant(tables: Mapping[str, Any]) -> Mapping[str, Any]:
+def _without_told_settings(tables: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return a file's settings without those that inform the controller about the plant."""
     values = values_of(tables)
+    # Only a calibrated twin has a posterior; a hand-written file keeps all its settings.
     if POSTERIOR in tables and isinstance(values.get("controller"), Mapping):
-        told = told_settings(Cylinder())
-        own = {name: value for name, value in values["controller"].items() if name not in told}
-        values = {**values, "controller": own}
+        informed = told_settings(Cylinder())
+        controller = {
+            name: value for name, value in values["controller"].items() if name not in informed
+        }
+        values = {**values, "controller": controller}
     return values

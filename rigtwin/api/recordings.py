@@ -1,4 +1,4 @@
-"""Recordings as they are worked with: channels, plots, videos, exports."""
+"""Recordings with their machine: channels, plots, videos, exports and imports."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from rigtwin.api.machines import Settings, machine, machine_of, the_machine, twin_of
+from rigtwin.api.machines import Settings, machine_of, resolve_machine, twin_of
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Machine
 from rigtwin.errors import RigtwinError
@@ -22,16 +22,16 @@ from rigtwin.recording import export, reader
 
 @dataclass(frozen=True)
 class Recording(reader.Recording):
-    """A test as it was recorded.
+    """One recorded test.
 
-    `recording["/sensor.load_cell"]` is a channel, shape (ticks,), `recording.time` its time in s,
-    `recording.channels` names them all, `recording.units` says their units.
+    `recording["/sensor.load_cell"]` is a channel, shape (ticks,). `recording.time` is its time in
+    s, shape (ticks,). `recording.channels` names all channels, and `recording.units` their units.
     """
 
     described: Machine | None = field(default=None, repr=False)
-    """The machine that it is of, where it was said."""
+    """Machine of the recording, if it was stated when the recording was loaded or made."""
     report: tuple[str, ...] = field(default=(), repr=False)
-    """What was found in the data that it was made of, where it was imported."""
+    """Lines about the imported data: gaps, units, columns used. Empty unless it was imported."""
 
     @property
     def tripped(self) -> bool:
@@ -47,25 +47,30 @@ class Recording(reader.Recording):
         style: str = "screen",
         panels: Sequence[str] = (),
     ) -> Path:
-        """Draws it.
+        """Draw the recorded signals over time.
 
         Parameters
         ----------
         out
-            A png, svg or pdf file.
+            File to write, with the ending png, svg or pdf.
         start, until
-            s, the stretch that is drawn; until the end by default.
+            Interval that is drawn, in s. `until` defaults to the end of the test.
         style
-            "screen", or "paper" and "paper-wide" for one and two columns of a journal.
+            "screen", "paper" (one column of a journal) or "paper-wide" (two columns).
         panels
-            What the titles of those that are drawn begin with; all by default.
+            Beginnings of the titles of the panels that are drawn. Defaults to all panels.
+
+        Returns
+        -------
+        Path
+            The file.
 
         Raises
         ------
         RigtwinError
-            For another ending or style, an empty stretch, or a panel that it does not have.
+            For an unknown ending, style or panel, or an empty interval.
         """
-        from rigtwin.render.plot import draw  # Late: matplotlib takes a second.
+        from rigtwin.render.plot import draw  # Imported late: matplotlib takes a second.
         from rigtwin.render.style import find_style
 
         draw(self, forbid_overwriting(out, self.path), start, until, find_style(style), panels)
@@ -79,27 +84,33 @@ class Recording(reader.Recording):
         settings: Settings = (),
         **options: Any,
     ) -> Path:
-        """Films it.
+        """Film the machine in motion, with its signals beneath.
 
         Parameters
         ----------
         out
-            An mp4 file.
+            File to write, mp4.
         ghost
-            The twin's prediction is drawn through the machine, its gap so many times as large; 0
-            for none.
+            Magnification of the gap between the machine and its twin, whose prediction is drawn
+            through the machine. 0, the default, draws no twin.
         settings
-            Changes of that twin.
+            Changes of the twin that is drawn: of its plant and `timing.timestep`.
         **options
-            camera, start and until in s, magnify, progress; see `rigtwin.render.video.film`.
+            `camera`, `start` and `until` in s, `magnify`, `progress`; see
+            `rigtwin.render.video.film`.
+
+        Returns
+        -------
+        Path
+            The file.
 
         Raises
         ------
         RigtwinError
-            If this computer cannot draw, the file cannot be written, or there is to be a ghost and
-            the twin cannot be held against it.
+            If this computer cannot draw, the file cannot be written, or a ghost is asked for and
+            the twin cannot be compared with the recording.
         """
-        from rigtwin.render.video import film  # Late: so does scipy.signal.
+        from rigtwin.render.video import film  # Imported late: scipy.signal takes a second.
 
         machine = machine_of(self)
         if not 0.0 <= ghost < math.inf:
@@ -110,13 +121,24 @@ class Recording(reader.Recording):
         return Path(out)
 
     def export(self, out: str | Path) -> Path:
-        """Writes it as csv or mat, by the name's ending. Raises RigtwinError for any other."""
+        """Write the recording as CSV or MAT.
+
+        Parameters
+        ----------
+        out
+            File to write; its ending, csv or mat, selects the format.
+
+        Raises
+        ------
+        RigtwinError
+            For any other ending.
+        """
         export.export(self, forbid_overwriting(out, self.path))
         return Path(out)
 
     @property
     def units(self) -> dict[str, str]:
-        """Channel → unit, of those that the machine's description knows."""
+        """Unit of each channel that the machine's description knows: channel → unit."""
         known = machine_of(self).units
         return {name: known[name] for name in self.channels if name in known}
 
@@ -124,8 +146,20 @@ class Recording(reader.Recording):
 def _ghost(
     recording: Recording, machine: Machine, twin: Configuration, magnify: float
 ) -> dict[str, Array]:
-    """Where a twin's joints stand, the gap drawn larger, at every tick. Raises RigtwinError where
-    there is nothing to be drawn."""
+    """Return the twin's joint positions for drawing, with its gap to the machine magnified.
+
+    The drawn position is q + m (q_twin - q), with the measured position q and magnification m.
+
+    Returns
+    -------
+    dict
+        Joint → position at every tick, in m or rad, shape (ticks,).
+
+    Raises
+    ------
+    RigtwinError
+        If the twin's motion is prescribed by the measurement, so that the two coincide.
+    """
     from rigtwin.looking import Look
 
     look = Look(machine, recording, twin)
@@ -138,39 +172,52 @@ def _ghost(
     }
 
 
-def load(path: str | Path, of: Machine | str | Path | None = None) -> Recording:
-    """Reads a recording.
+def load(path: str | Path, machine: Machine | str | Path | None = None) -> Recording:
+    """Read a recording.
 
     Parameters
     ----------
     path
-        Of an MCAP file, whoever wrote it.
-    of
-        The machine, or its name or description; by default the one that the recording names.
+        MCAP file in the format of docs/recording.md: a test on a rig, on a twin, or imported data.
+    machine
+        Machine the recording belongs to, or its name, or the path of its description. Defaults to
+        the one named in the recording.
+
+    Returns
+    -------
+    Recording
+        The test. `recording["/sensor.load_cell"]` is a channel of shape (ticks,), `recording.time`
+        is in s; `plot`, `video` and `export` write files of it.
 
     Raises
     ------
     RigtwinError
-        If it is no recording, is empty, or is of a format that this version does not read.
+        If the file is missing, is no recording, is empty, or has a format that this version does
+        not read. Also for an unknown machine.
+
+    Examples
+    --------
+    >>> recording = rigtwin.load("rig.mcap")  # doctest: +SKIP
+    >>> recording["/sensor.load_cell"].mean()  # doctest: +SKIP
     """
     if not isinstance(path, str | Path):
         raise RigtwinError(f"{path!r:.60}: expected the path of a recording")
-    return faced(reader.load(Path(path)), machine(of) if isinstance(of, str | Path) else of)
+    return with_machine(reader.load(Path(path)), _resolve_optional(machine))
 
 
-def the_recording(given: reader.Recording | str | Path) -> reader.Recording:
-    """A recording, or the one of that path. Raises RigtwinError for anything else."""
-    if isinstance(given, reader.Recording):
-        return given
-    if isinstance(given, str | Path):
-        return load(given)
-    raise RigtwinError(f"{given!r:.60}: expected a recording, or the path of one")
+def resolve_recording(recording: reader.Recording | str | Path) -> reader.Recording:
+    """Return a recording; a path is read first. Raises RigtwinError for any other type."""
+    if isinstance(recording, reader.Recording):
+        return recording
+    if isinstance(recording, str | Path):
+        return load(recording)
+    raise RigtwinError(f"{recording!r:.60}: expected a recording, or the path of one")
 
 
-def faced(plain: reader.Recording, described: Machine | None) -> Recording:
-    return Recording(
-        **{each.name: getattr(plain, each.name) for each in fields(plain)}, described=described
-    )
+def with_machine(recording: reader.Recording, machine: Machine | None) -> Recording:
+    """Return a recording with its machine attached, which spares a search for its description."""
+    values = {attribute.name: getattr(recording, attribute.name) for attribute in fields(recording)}
+    return Recording(**values, described=machine)
 
 
 def import_data(
@@ -180,7 +227,7 @@ def import_data(
     *,
     machine: Machine | str | Path | None = None,
 ) -> Recording:
-    """Make a recording of another program's data.
+    """Convert another program's data to a recording.
 
     Parameters
     ----------
@@ -189,9 +236,10 @@ def import_data(
         side, row by row; or data in memory: a pandas DataFrame, an Arrow table, or a dictionary of
         name → array, shape (rows,) or (rows, items).
     mapping
-        Map from columns to channels: a TOML file, or its tables as a dictionary.
+        Map from columns to channels (docs/importing.md): a TOML file, or its tables as a
+        dictionary.
     out
-        The recording, an MCAP file.
+        File of the recording, MCAP.
     machine
         Machine the data belong to, or its name or description. Defaults to the one named in the
         map.
@@ -199,15 +247,20 @@ def import_data(
     Returns
     -------
     Recording
-        The recording, with a report of what was found on the way.
+        The recording. Its `report` has lines about the data: gaps, repeated times, columns used.
 
     Raises
     ------
     RigtwinError
-        Naming the column, unit or line that is at fault. Also for data of several episodes.
+        If the data cannot be imported; the message names the column, unit or line. Also for data
+        of several episodes, which `import_episodes` reads.
+
+    Examples
+    --------
+    >>> rigtwin.import_data("bench.csv", "map.toml", "bench.mcap")  # doctest: +SKIP
     """
-    described = _described(machine)
-    report = convert(_given(data), _map_of(mapping), Path(out), described)
+    described = _resolve_optional(machine)
+    report = convert(_as_paths(data), _as_map(mapping), Path(out), described)
     return replace(load(out, described), report=tuple(report))
 
 
@@ -218,45 +271,51 @@ def import_episodes(
     *,
     machine: Machine | str | Path | None = None,
 ) -> tuple[Recording, ...]:
-    """Make a recording of each episode of another program's data.
+    """Convert each episode of another program's data to a recording.
 
     Parameters
     ----------
     data, mapping, machine
         As for `import_data`.
     folder
-        Folder of the recordings, made if it is absent.
+        Folder of the recordings. It is created if it does not exist.
 
     Returns
     -------
     tuple of Recording
-        In the order of the episodes. An episode that cannot be imported is left out, which every
-        report states.
+        Recordings in the order of the episodes. An episode that cannot be imported is omitted, and
+        every report states so.
 
     Raises
     ------
     RigtwinError
         If no episode can be imported.
     """
-    described = _described(machine)
-    done = convert_episodes(_given(data), _map_of(mapping), Path(folder), described)
-    return tuple(replace(load(each.path, described), report=each.report) for each in done)
+    described = _resolve_optional(machine)
+    episodes = convert_episodes(_as_paths(data), _as_map(mapping), Path(folder), described)
+    return tuple(
+        replace(load(episode.path, described), report=episode.report) for episode in episodes
+    )
 
 
-def _described(given: Machine | str | Path | None) -> Machine | None:
-    return None if given is None else the_machine(given)
+def _resolve_optional(machine: Machine | str | Path | None) -> Machine | None:
+    return None if machine is None else resolve_machine(machine)
 
 
-def _given(data: Any) -> Any:
+def _as_paths(data: Any) -> Any:
     """Return paths as a list, and data in memory as they are."""
     if isinstance(data, str | Path):
         return [Path(data)]
-    if isinstance(data, list | tuple) and data and all(isinstance(n, str | Path) for n in data):
+    if (
+        isinstance(data, list | tuple)
+        and data
+        and all(isinstance(name, str | Path) for name in data)
+    ):
         return [Path(name) for name in data]
     if isinstance(data, bool | int | float) or data is None:
         raise RigtwinError(f"data {data!r}: expected the path of a file, or a table in memory")
     return data
 
 
-def _map_of(given: str | Path | Mapping[str, Any]) -> Path | Mapping[str, Any]:
-    return given if isinstance(given, Mapping) else Path(given)
+def _as_map(mapping: str | Path | Mapping[str, Any]) -> Path | Mapping[str, Any]:
+    return mapping if isinstance(mapping, Mapping) else Path(mapping)

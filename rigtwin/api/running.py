@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from rigtwin.api.machines import Effects, Settings, effect_texts, the_machine
-from rigtwin.api.recordings import Recording, faced
+from rigtwin.api.machines import Effects, Settings, effect_texts, resolve_machine
+from rigtwin.api.recordings import Recording, with_machine
 from rigtwin.description.changes import with_changes
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Machine
@@ -21,11 +21,11 @@ from rigtwin.simulation.experiment import Demands, Experiment, find_experiment
 from rigtwin.simulation.loop import TickController
 
 Demanding = Callable[[Configuration, int], Demands]
-"""An experiment of one's own: what is demanded of the machine for (settings, seed)."""
+"""Function that returns the demands of a test for (configuration, seed)."""
 
 
 def run(
-    on: Machine | str | Path,
+    machine: Machine | str | Path,
     experiment: str | Experiment | Demanding,
     *,
     seed: int = 0,
@@ -36,114 +36,124 @@ def run(
     path: str | Path | None = None,
     progress: Callable[[int], object] = lambda _ticks: None,
 ) -> Recording:
-    """Runs a test on a machine's twin.
+    """Simulate a test on a machine's twin and return its recording.
 
     Parameters
     ----------
-    on
-        The machine, its name or its description's path, see `machine`; also a corrected one,
-        `Diagnosis.machine`.
+    machine
+        Machine, its name, or the path of its description. A corrected machine,
+        `Diagnosis.machine`, can be run as well.
     experiment
-        Its name among `experiments`, an `Experiment`, or a function that gives the demands.
+        Name of an experiment of the machine (`experiments` lists them), an `Experiment`, or a
+        function of (configuration, seed) that returns the demands of every tick: an array of shape
+        (ticks, 3) on the suspension rig (ground in m, structure in m, force in N), a dictionary
+        demand → array of shape (ticks,) on any other machine.
     seed
-        Of the excitation and of the sensors' noise; the same seed gives the same recording.
+        Seed of the excitation and of the sensor noise, at least 0. The same seed gives the same
+        recording, byte for byte.
     effects
-        What the twin has and its operator does not know of.
+        Hidden effects: simulated, but not stored in the recording's settings. For example
+        {"coulomb@rail": 80}, with the magnitude in the unit that `effects(machine)` states.
     effects_from
-        s of the test from when on it has them; the suspension rig alone.
+        Time at which the effects begin, in s from the test's start. Only the suspension rig's twin
+        takes a time other than 0.
     settings
-        Changes of what the operator knows.
+        Changes of the configuration, which the recording states: group → name → value, or the path
+        of a TOML file, or a sequence of both.
     controller
-        One of your own instead of the machine's: an object with `tick(measured, demand)`, or a
-        function, compiled or not; it returns `controllers.Commands` on the suspension rig, the
-        actuator's command on any other machine, for measurements and demands by name.
+        Controller in place of the machine's own: an object with `tick(measured, demand)`, or such a
+        function, compiled or not. On the suspension rig it returns `controllers.Commands`; on any
+        other machine, measurements and demands are passed by name and it returns the actuator's
+        command.
     path
-        Where to record; by default nowhere but in memory.
+        File of the recording, MCAP. By default the recording is kept in memory only.
     progress
-        Called with the ticks done since its last call.
+        Function called with the number of ticks since its last call.
+
+    Returns
+    -------
+    Recording
+        The recorded test. `recording["/sensor.load_cell"]` is a channel of shape (ticks,);
+        `recording.time` is in s; `recording.end` states why the test ended, and `recording.tripped`
+        whether a limit ended it.
 
     Raises
     ------
     RigtwinError
-        If anything asked for is not known or not allowed, before the test starts.
+        If the machine, experiment, an effect or a setting is unknown or not allowed. No file is
+        written then.
+
+    Examples
+    --------
+    >>> import rigtwin
+    >>> recording = rigtwin.run("emps", "positioning", effects={"coulomb@guide": 20})
+    >>> recording.tripped
+    False
+    >>> rigtwin.run("suspension-rig", "drop", seed=1, path="drop.mcap")  # doctest: +SKIP
     """
     if not isinstance(seed, int) or seed < 0:
         raise RigtwinError(f"seed {seed!r:.60}: expected a whole number from 0")
     if controller is not None and not callable(getattr(controller, "tick", controller)):
         raise RigtwinError(f"controller {controller!r:.60}: expected a function, or a method tick")
-    on = the_machine(on)
+    described = resolve_machine(machine)
+    test = _resolve_experiment(described, experiment)
+    configuration = with_changes(test.configuration, settings)
+    _check_onset(effects_from, bool(effects), described, configuration)
+
+    def record(target: Path) -> None:
+        described.physics.record(
+            target,
+            described,
+            test.name,
+            configuration,
+            test.demands(configuration, seed),
+            seed,
+            effects=effect_texts(effects),
+            effects_from=effects_from,
+            controller=getattr(controller, "tick", controller),
+            progress=progress,
+        )
+
+    if path is not None:
+        record(recordable(forbid_overwriting(path, *described.files)))
+        return with_machine(reader.load(Path(path)), described)
+    # The writer needs a file. A recording in memory has read all of it before the folder goes, and
+    # keeps the name alone.
+    with TemporaryDirectory(prefix="rigtwin-") as folder:
+        file = Path(folder) / f"{test.name}-{seed}.mcap"
+        record(file)
+        return replace(with_machine(reader.load(file), described), path=Path(file.name))
+
+
+def _check_onset(
+    effects_from: float, has_effects: bool, machine: Machine, configuration: Configuration
+) -> None:
+    """Refuse a time of the effects' onset, in s, that cannot be simulated."""
     if not 0.0 <= effects_from < math.inf:
         raise RigtwinError(f"effects from {effects_from:g} s: expected 0 s or more")
-    if effects_from and not on.physics.delays_effects:
+    if not effects_from:
+        return
+    if not machine.physics.delays_effects:
         raise RigtwinError(
-            f"{on.name}: `effects_from`: the twin of {on.physics.title} takes effects "
+            f"{machine.name}: `effects_from`: the twin of {machine.physics.title} takes effects "
             "from the start only"
         )
-    if effects_from and not effects:
+    if not has_effects:
         raise RigtwinError(f"`effects_from` = {effects_from:g} s requires `effects`")
-    test = _experiment(on, experiment)
-    configuration = with_changes(test.configuration, settings)
-    if effects_from and effects_from >= configuration.timing.duration:
+    if effects_from >= configuration.timing.duration:
         raise RigtwinError(
             f"effects from {effects_from:g} s on: the test is over at "
             f"{configuration.timing.duration:g} s"
         )
 
-    def work(kept: Path) -> None:
-        _record(
-            path=kept,
-            on=on,
-            test=test,
-            configuration=configuration,
-            seed=seed,
-            effects=effect_texts(effects),
-            effects_from=effects_from,
-            controller=controller,
-            progress=progress,
-        )
 
-    if path is not None:
-        work(recordable(forbid_overwriting(path, *on.files)))
-        return faced(reader.load(Path(path)), on)
-    with TemporaryDirectory(prefix="rigtwin-") as folder:
-        kept = Path(folder) / f"{test.name}-{seed}.mcap"
-        work(kept)
-        return replace(faced(reader.load(kept), on), path=Path(kept.name))
-
-
-def _experiment(of: Machine, experiment: str | Experiment | Demanding) -> Experiment:
+def _resolve_experiment(machine: Machine, experiment: str | Experiment | Demanding) -> Experiment:
+    """Return the experiment that an argument of `run` names or defines."""
     if isinstance(experiment, str):
-        return find_experiment(of, experiment)
+        return find_experiment(machine, experiment)
     if isinstance(experiment, Experiment):
         return experiment
     if not callable(experiment):
         raise RigtwinError(f"experiment {experiment!r:.60}: expected a name, or a function")
     name = getattr(experiment, "__name__", "own")
-    return Experiment(name, "", "", of.configuration, experiment)
-
-
-def _record(
-    path: Path,
-    on: Machine,
-    test: Experiment,
-    configuration: Configuration,
-    seed: int,
-    effects: Sequence[str],
-    effects_from: float,
-    controller: TickController | Callable[..., Any] | None,
-    progress: Callable[[int], object],
-) -> None:
-    tick: Any = getattr(controller, "tick", controller)
-    demands = test.demands(configuration, seed)
-    on.physics.record(
-        path,
-        on,
-        test.name,
-        configuration,
-        demands,
-        seed,
-        effects=effects,
-        effects_from=effects_from,
-        controller=tick,
-        progress=progress,
-    )
+    return Experiment(name, "", "", machine.configuration, experiment)

@@ -1,5 +1,8 @@
-"""Tests under supervision: on the rig's card, on its virtual copy, or on the twin behind the card's
-converters; one test, or a list of them."""
+"""Supervised tests on the rig's card, on a virtual card, or on the twin behind a card.
+
+`plan_test` reads a test, `dry_run` rehearses it, `run_on_twin` and `run_on_card` run it, and
+`run_session` runs a list of tests.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +14,7 @@ from datetime import date
 from pathlib import Path
 
 from machines import DEFAULT_MACHINE
-from rigtwin.api.machines import Effects, Settings, effect_texts, the_machine
+from rigtwin.api.machines import Effects, Settings, effect_texts, resolve_machine
 from rigtwin.api.recordings import Recording, load
 from rigtwin.description.changes import read_toml, with_changes
 from rigtwin.description.configuration import Configuration
@@ -41,14 +44,14 @@ from rigtwin.simulation.peaks import Peak
 
 PORTS = 65535
 LOCK = "session.lock"
-"""In a session's folder; who holds it runs into that folder alone."""
+"""Lock file in a session's folder: only one session at a time writes into a folder."""
 Stop = Callable[[], str | None]
-"""Called in every tick; a text ends the test and is its reason."""
+"""Function called in every tick. A returned text ends the test and is recorded as its reason."""
 
 
 @contextmanager
 def _stopped_by(stop: Stop | None, file: str | Path | None) -> Iterator[Stop]:
-    """By what a test is stopped: a function, or the operator's keys, signals and file."""
+    """Yield the function that may stop a test: `stop`, or the operator's keys, signals and file."""
     if stop is not None:
         yield stop
     else:
@@ -58,8 +61,19 @@ def _stopped_by(stop: Stop | None, file: str | Path | None) -> Iterator[Stop]:
 
 @dataclass(frozen=True)
 class SessionResult:
-    """A test under supervision. path: of its recording; ticks: that were recorded; cause: why it
-    ended, in words; completed: whether that was its end."""
+    """Result of a supervised test.
+
+    Attributes
+    ----------
+    path : Path
+        File of the recording.
+    ticks : int
+        Number of recorded ticks.
+    cause : str
+        Reason why the test ended, in words.
+    completed : bool
+        Whether the test reached its planned end.
+    """
 
     path: Path
     ticks: int
@@ -69,9 +83,21 @@ class SessionResult:
 
 @dataclass(frozen=True)
 class DryRun:
-    """A session on the virtual card. cause: why it ended, in words; passed: whether that was its
-    end, so that the rig may be armed for it; peaks: how near it comes to every limit; obstacles:
-    what would keep it off the rig besides, a line each."""
+    """Result of a session on the virtual card.
+
+    Attributes
+    ----------
+    recording : Recording or None
+        Recording of the session; None if it ended before the first tick.
+    cause : str
+        Reason why the session ended, in words.
+    passed : bool
+        True if the session reached its planned end. Only then may the rig be armed for this test.
+    peaks : tuple of Peak
+        Predicted peak of each limited quantity, with its limit and margin.
+    obstacles : tuple of str
+        Further reasons that prevent the test on the rig, one line each.
+    """
 
     recording: Recording | None
     cause: str
@@ -90,51 +116,66 @@ def plan_test(
     effects: Effects = (),
     controller: ControllerFactory | None = None,
 ) -> AnyTest:
-    """A test ready to be run under supervision.
+    """Return a test that is ready for supervision.
 
     Parameters
     ----------
     experiment
-        Its name.
+        Name of an experiment of the machine.
     machine
-        Whose, by name or description; another than the suspension rig is moved by force actuators
-        and servos alone.
+        Machine, its name, or the path of its description. Machines other than the suspension rig
+        may have force actuators and servos only.
     card
-        The channel table, TOML; of the suspension rig by default the shipped one.
+        Channel table of the card, TOML. Defaults to the shipped one of the suspension rig; other
+        machines need their own.
     settings
-        Changes, {"safety": {"force": 1200}}, or a TOML file that holds them, or several.
+        Changes of the configuration, such as {"safety": {"force": 1200}}, or the path of a TOML
+        file, or a sequence of both.
     seed
-        Of the twin's noise, and of the road.
+        Seed of the twin's noise and of the road, at least 0.
     effects
-        What the twin has besides; the machine has its own.
+        Effects added to the twin. They do not apply to the machine itself.
     controller
-        A function of the test's configuration that makes one of your own instead of the machine's,
-        see `run`; a new one for each session.
+        Function of the test's configuration that returns a custom controller, see `run`. It is
+        called once for each session.
+
+    Returns
+    -------
+    AnyTest
+        The planned test.
 
     Raises
     ------
     RigtwinError
-        For any mistake in these.
+        For a mistake in any argument, or a controller that the machine cannot run.
     """
     if not isinstance(seed, int) or seed < 0:
         raise RigtwinError(f"seed {seed!r:.60}: expected a whole number from 0")
-    on = the_machine(machine)
-    found = find_experiment(on, experiment)
-    configuration = check_settings(on, found.configuration, settings)
-    own = None if controller is None else custom_controller(controller)
-    told = tuple(effect_texts(effects))
-    physics = on.physics
+    described = resolve_machine(machine)
+    test = find_experiment(described, experiment)
+    configuration = check_settings(described, test.configuration, settings)
+    physics = described.physics
     path = physics.card if card is None else Path(card)
     if path is None:
-        raise RigtwinError(f"{on.name}: no channel table; expected that of the card it is on")
-    table = load_table(path, physics.signals(on))
-    return physics.plan(on, found, configuration, seed, table, told, own)
+        raise RigtwinError(
+            f"{described.name}: no channel table; expected the table of the card it is wired to"
+        )
+    return physics.plan(
+        described,
+        test,
+        configuration,
+        seed,
+        load_table(path, physics.signals(described)),
+        tuple(effect_texts(effects)),
+        None if controller is None else custom_controller(controller),
+    )
 
 
 def check_settings(machine: Machine, base: Configuration, changes: Settings) -> Configuration:
-    """The settings of a test that can be run. Raises RigtwinError for one that cannot."""
+    """Return changed settings. Raises RigtwinError if no test can be run with them."""
     configuration = with_changes(base, changes)
     require_order(machine, configuration)
+    # Both properties raise where period and timestep do not divide the duration.
     _ = configuration.ticks, configuration.substeps
     return configuration
 
@@ -153,27 +194,36 @@ def dry_run(
     stop: Stop | None = None,
     stop_file: str | Path | None = None,
 ) -> DryRun:
-    """Runs the exact session of a test on the virtual card, before the machine is armed for it.
+    """Run the exact session of a test on the virtual card, before the machine is armed for it.
 
-    A session that passes is noted beside the channel table; the machine is armed by a person, for
-    just what has passed.
+    A session that passes is noted beside the channel table. The machine can then be armed by a
+    person, for exactly this test.
 
     Parameters
     ----------
-    experiment, machine, card, settings, seed, controller, effects
-        As of `run_on_card`; with any effects, or with the shipped table, nothing is noted.
+    experiment, machine, card, settings, seed, controller
+        Test to rehearse, see `plan_test`. With the shipped channel table nothing is noted.
+    effects
+        Effects added to the twin. With any effect nothing is noted.
     path
-        Of the recording.
+        File of the recording, MCAP.
     progress
-        Called with the ticks that were done since its last call.
-    stop, stop_file
-        Gives a reason to end the session; by default it ends at a key, at a signal such as
-        Ctrl-C's, or when that file appears.
+        Function called with the number of ticks since its last call.
+    stop
+        Function that returns a reason to end the session, or None. By default the session ends at
+        a key, or at a signal such as Ctrl-C's.
+    stop_file
+        File whose appearance ends the session, unless `stop` is given.
+
+    Returns
+    -------
+    DryRun
+        Reason of the end, the recording, and the margin to every limit.
 
     Raises
     ------
     RigtwinError
-        For what the session could not be run with on the rig either.
+        If the test could not be run on the machine either.
     """
     test = plan_test(
         experiment,
@@ -190,11 +240,11 @@ def dry_run(
     recording = load(Path(path)) if ended.ticks else None
     passed = ended.cause == COMPLETED
     peaks = test.predict_peaks(recording) if recording is not None else ()
-    # The shipped table arms nothing, and where it lies nothing is written.
+    # The shipped table arms nothing, and its folder may be read-only.
     shipped = Path(card).resolve().parent == CARD.resolve().parent
     if passed and not test.effects and not shipped:
-        said = {"experiment": test.experiment, "date": date.today().isoformat()}
-        add_dry_run(Path(card), key_of(test), said)
+        note = {"experiment": test.experiment, "date": date.today().isoformat()}
+        add_dry_run(Path(card), key_of(test), note)
     return DryRun(recording, ended.cause.reason, passed, peaks, list_obstacles(test))
 
 
@@ -214,27 +264,32 @@ def run_on_twin(
     stop: Stop | None = None,
     stop_file: str | Path | None = None,
 ) -> SessionResult:
-    """Runs a test under supervision on the twin, behind the card's converters.
+    """Run a supervised test on the twin, behind the card's converters.
 
     Parameters
     ----------
     experiment, machine, card, settings, seed, controller, effects
-        As of `plan_test`.
+        Test to run, see `plan_test`.
     path
-        Of the recording.
+        File of the recording, MCAP.
     real_time
-        At the pace of the clock, or as fast as it goes.
+        Whether the twin keeps pace with the clock. By default it runs as fast as possible.
     live
-        Port of a live view; 0 for none.
+        Port of a live view for Foxglove; 0, the default, opens none.
     progress
-        Called with the ticks that were done since its last call.
+        Function called with the number of ticks since its last call.
     stop, stop_file
-        As of `dry_run`.
+        Reasons to end the test, see `dry_run`.
+
+    Returns
+    -------
+    SessionResult
+        Recording, and the reason why the test ended.
 
     Raises
     ------
     RigtwinError
-        Before anything is run.
+        For a mistake in any argument, before the test starts.
     """
     _require_port(live)
     test = plan_test(
@@ -274,37 +329,37 @@ def run_on_card(
     stop: Stop | None = None,
     stop_file: str | Path | None = None,
 ) -> SessionResult | None:
-    """Runs a test on the machine itself.
+    """Run a test on the machine itself.
 
     Parameters
     ----------
     experiment, machine, settings, seed, controller
-        As of `plan_test`.
+        Test to run, see `plan_test`.
     card
-        The channel table that somebody answers for.
+        Channel table of the card, calibrated and signed by an operator.
     path
-        Of the recording.
+        File of the recording, MCAP.
     arm
-        Asks whoever stands at it whether everybody is clear of it. Nothing has moved when it
-        is called, and nothing moves if it says no.
+        Function that asks the operator whether everybody is clear of the machine. It is called
+        before anything moves, and nothing moves unless it returns True.
     without_dry_run
-        Who answers for it that there was no dry run of just this, if there was none.
+        Name of the person responsible for a test without a passed dry run. It is recorded.
     live
-        Port of a live view; 0 for none.
+        Port of a live view for Foxglove; 0, the default, opens none.
     progress
-        Called with the ticks that were done since its last call.
+        Function called with the number of ticks since its last call.
     stop, stop_file
-        As of `dry_run`.
+        Reasons to end the test, see `dry_run`.
 
     Returns
     -------
     SessionResult or None
-        How it ended; None if it was not armed.
+        Recording, and the reason why the test ended. None if the machine was not armed.
 
     Raises
     ------
     RigtwinError
-        If the test must not be run on it, before anything moves.
+        If the test is not permitted on this machine, before anything moves.
     """
     _require_port(live)
     test = plan_test(
@@ -341,50 +396,50 @@ def run_session(
     resume: bool = False,
     real: bool = False,
     prepare: Callable[[PlannedTest], object] | None = None,
-    told: Callable[[str], object] = lambda _: None,
+    on_message: Callable[[str], object] = lambda _: None,
 ) -> bool:
-    """Runs a list of tests, up to the first that does not complete.
+    """Run a list of tests, up to the first one that does not complete.
 
     Parameters
     ----------
     plan
-        The list, TOML.
+        File of the list, TOML.
     folder
-        Of the recordings.
+        Folder of the recordings. It is created if it does not exist.
     run
-        Runs one test into a recording, by `run_on_twin`, `run_on_card` or, of any machine,
-        `rigtwin.run`; whether it completed.
+        Function of (test, path) that records one test, by `run_on_twin`, `run_on_card` or
+        `rigtwin.run`, and returns whether it completed.
     machine
-        Whose experiments the list names.
+        Machine whose experiments the list names, or its name, or the path of its description.
     resume
-        Whether to leave out what has completed already.
+        Whether to skip tests that are already complete.
     real
-        Whether only a recording of the rig itself counts as that.
+        Whether only a recording of the rig itself counts as complete.
     prepare
-        Called with every test before the first is run; raises for one that cannot be. By default
-        that is one whose settings the machine does not have.
-    told
-        Called with a line for people.
+        Function called with every test before the first one starts; it raises RigtwinError for a
+        test that cannot be run. By default settings and demands are checked.
+    on_message
+        Function called with one line for the operator.
 
     Returns
     -------
     bool
-        Whether all completed.
+        Whether all tests completed.
 
     Raises
     ------
     RigtwinError
-        For a mistake in any test of the list, or a folder into which another session runs, before
-        anything moves.
+        For a mistake in any test of the list, or if another session writes into the folder. It is
+        raised before anything moves.
     """
-    folder, on = Path(folder), the_machine(machine)
+    folder, described = Path(folder), resolve_machine(machine)
 
     def find_test(name: str) -> Experiment:
-        return find_experiment(on, name)
+        return find_experiment(described, name)
 
     def check(test: PlannedTest) -> object:
         experiment = find_test(test.experiment)
-        configuration = check_settings(on, experiment.configuration, test.changes)
+        configuration = check_settings(described, experiment.configuration, test.changes)
         return experiment.demands(configuration, test.seed)
 
     tests = read_toml(Path(plan), lambda tables: parse_plan(tables, find_test))
@@ -400,14 +455,13 @@ def run_session(
             resume=resume,
             real=real,
             prepare=prepare or check,
-            told=told,
+            on_message=on_message,
         )
 
 
 @contextmanager
 def _alone(folder: Path) -> Iterator[None]:
-    """Keeps a folder for this session while it runs. Raises RigtwinError if another one runs into
-    it."""
+    """Lock a folder for this session. Raises RigtwinError if another session has locked it."""
     try:
         held = open_alone(folder / LOCK)
     except OSError as error:
@@ -427,7 +481,7 @@ def _run_tests(
     resume: bool,
     real: bool,
     prepare: Callable[[PlannedTest], object],
-    told: Callable[[str], object],
+    on_message: Callable[[str], object],
 ) -> bool:
     paths = {test.name: folder / f"{test.name}.mcap" for test in tests}
     todo = [test for test in tests if not (resume and is_complete(paths[test.name], real))]
@@ -436,22 +490,24 @@ def _run_tests(
         raise RigtwinError(
             f"{folder} holds {taken[0]}.mcap already; resume it, or name another folder"
         )
-    # Every mistake is found before the first test moves anything.
+    # All tests are checked before the first one moves anything: a list that stops halfway because
+    # of a typing error wastes the time on the rig.
     for test in todo:
         prepare(test)
     if len(todo) < len(tests):
-        told(f"{len(tests) - len(todo)} of {len(tests)} tests are done already")
+        on_message(f"{len(tests) - len(todo)} of {len(tests)} tests are done already")
     for test in todo:
         if test.pause:
-            told(f"pause of {test.pause:g} s before {test.name}")
+            on_message(f"pause of {test.pause:g} s before {test.name}")
             time.sleep(test.pause)
         path = paths[test.name]
+        # An incomplete recording may still be worth a look, so it is renamed, not overwritten.
         aside = move_aside(path)
         completed = run(test, path)
         if aside is not None:
-            told(f"what was there before is in {aside}")
+            on_message(f"the previous recording is in {aside}")
         if not completed:
-            told(f"{test.name} did not complete; see {path}, then resume")
+            on_message(f"{test.name} did not complete; see {path}, then resume")
             return False
     return True
 
@@ -462,4 +518,4 @@ def _result(path: Path, ended: SessionEnd) -> SessionResult:
 
 def _require_port(live: int) -> None:
     if not isinstance(live, int) or not 0 <= live <= PORTS:
-        raise RigtwinError(f"live {live!r:.40}: expected a port up to {PORTS}")
+        raise RigtwinError(f"live {live!r:.40}: expected a port, 0 to {PORTS}")

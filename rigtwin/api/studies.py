@@ -1,4 +1,4 @@
-"""Studies on the twin: tuning, stability, the thesis again, the diagnosis held to its word."""
+"""Studies on the twin: tuning, stability, reproduction of the thesis, checks of the diagnosis."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from experiments.thesis.result import reproduce as reproduce_thesis
 from experiments.tuning import find_study
 from experiments.vehicles import find_vehicle
 from referee import arm, check, wild
-from rigtwin.api.machines import the_machine
+from rigtwin.api.machines import resolve_machine
 from rigtwin.description.machine import Machine
 from rigtwin.description.posterior import load_posterior
 from rigtwin.errors import RigtwinError
@@ -41,37 +41,52 @@ from rigtwin.studies.tuning.result import tune as tune_study
 MOST_PLANTS = 1000
 Draw = Literal["wild", "arm"]
 Progress = Callable[[int, int], object]
-"""Called with what is done and with how much there is in all."""
+"""Function called with the number of finished steps and with their total."""
 
 
-def _nothing(*_: object) -> None:
-    """Tells nobody."""
+def _ignore_progress(*_: object) -> None:
+    """Discard a report of progress."""
 
 
 def identifiability(
-    of: Machine | str | Path,
+    machine: Machine | str | Path,
     *,
     seconds: float = math.inf,
-    progress: Callable[[str], object] = _nothing,
+    progress: Callable[[str], object] = _ignore_progress,
 ) -> Identifiability:
-    """What a machine's sensors can never show, whatever it does: before there are any data.
+    """Find the effects that a machine's sensors can never show, before any data are recorded.
+
+    The machine is simulated with synthetic motions within its joints' range, and the rank of the
+    sensitivities of all sensors to all effects decides.
 
     Parameters
     ----------
-    of
-        The machine, see `machine`.
+    machine
+        Machine, its name, or the path of its description.
     seconds
-        Time that the work may take, s; effects that it does not suffice for are `untried`.
+        Limit of the computing time, in s, none by default. Effects that it does not suffice for
+        are `untried`.
     progress
-        Called with the name of what is worked out next.
+        Function called with the name of the next step.
 
     Returns
     -------
     Identifiability
-        Effects that leave a trace of their own, those that leave none, and those whose trace others
-        can leave as well.
+        `seen`, effects that can be told from all others; `unseen`, effects that change no recorded
+        signal; `confounded`, effect → effects that together change the signals in the same way;
+        `sums`, base parameters of rigid bodies; `untried`.
+
+    Raises
+    ------
+    RigtwinError
+        If the machine is unknown or its description has mistakes.
+
+    Examples
+    --------
+    >>> result = rigtwin.identifiability("damper-bench")  # doctest: +SKIP
+    >>> result.confounded  # doctest: +SKIP
     """
-    return find_identifiable(the_machine(of), seconds, progress)
+    return find_identifiable(resolve_machine(machine), seconds, progress)
 
 
 def tune(
@@ -87,54 +102,74 @@ def tune(
     held_out: int | None = None,
     workers: int | None = None,
     cluster: str | None = None,
-    progress: Progress = _nothing,
-    stage: Callable[[str], object] = _nothing,
+    progress: Progress = _ignore_progress,
+    stage: Callable[[str], object] = _ignore_progress,
 ) -> TuningResult:
-    """Tunes a controller on the twin, and judges it on roads that the tuning has not seen.
+    """Tune a controller on the twin, and judge it on roads that the tuning has not used.
 
     Parameters
     ----------
     study
-        By name, or the path of its file, docs/tuning.md.
+        Name of a shipped study, or the path of a study's file (docs/tuning.md).
     machine
-        Whose controller is tuned, see `machine`; by default that which the study names, or else
-        the suspension rig.
+        Machine whose controller is tuned, or its name, or the path of its description. Defaults to
+        the machine that the study names, or else to the suspension rig.
     settings
-        `group.name=value` for every run, over the study's own.
+        Changes `group.name=value` of every run. They override the study's own.
     twin
-        A calibrated twin, as a diagnosis writes it: to be tuned on, within its uncertainty.
+        File of a calibrated twin, as `Diagnosis.save_twin` writes it. The scenarios are drawn
+        from its uncertainty.
     out
-        The folder of the results, `tuning/STUDY` by default. What is there already is not run
-        again.
+        Folder of the results, `tuning/STUDY` by default. Runs that it contains are not repeated.
     seed
-        Of the optimiser; the same seed gives the same settings.
-    evaluations, roads, held_out
-        About how many candidates, scenarios that each is tried in, and scenarios to judge on; by
-        default the study's.
+        Seed of the optimiser, at least 0. The same seed gives the same settings.
+    evaluations
+        Approximate number of candidates. Defaults to the study's.
+    roads
+        Number of scenarios in which every candidate is tried. Defaults to the study's.
+    held_out
+        Number of scenarios for the judgement. Defaults to the study's.
     workers, cluster
-        Processes on this computer, one a core by default; or the address of a dask cluster.
+        Number of processes on this computer, one per core by default; or the address of a dask
+        cluster.
     progress
-        Called with the runs done and with about how many there will be.
+        Function called with the number of finished runs and with the expected total.
     stage
-        Called with what begins.
+        Function called with the name of each stage as it begins.
+
+    Returns
+    -------
+    TuningResult
+        `chosen`, the recommended candidate with its settings and scores; `front`, the Pareto front
+        of two objectives; `comparisons` of the baseline and the tuned settings on held-out
+        scenarios. The folder contains a page and `tuned.toml`, for `--config`.
 
     Raises
     ------
     RigtwinError
         For a mistake in the study, or if no candidate meets its constraints.
+
+    Examples
+    --------
+    >>> result = rigtwin.tune("skyhook", out="tuning/skyhook", roads=4)  # doctest: +SKIP
+    >>> result.chosen  # doctest: +SKIP
     """
     if seed < 0:
         raise RigtwinError(f"seed {seed}: expected 0 or more")
-    of = None if machine is None else the_machine(machine)
-    found = find_study(
-        study, settings, machine=of, roads=roads, held_out=held_out, evaluations=evaluations
+    loaded = find_study(
+        study,
+        settings,
+        machine=None if machine is None else resolve_machine(machine),
+        roads=roads,
+        held_out=held_out,
+        evaluations=evaluations,
     )
-    base = found.machine.configuration
+    base = loaded.machine.configuration
     posterior = None if twin is None else load_posterior(Path(twin), base)
-    folder = Path(out) if out is not None else default_folder(found)
+    folder = Path(out) if out is not None else default_folder(loaded)
     if folder.exists() and not folder.is_dir():
         raise RigtwinError(f"cannot write into {folder}: it is a file")
-    total, done = count_runs(found, posterior), 0
+    total, done = count_runs(loaded, posterior), 0
 
     def step(more: int) -> None:
         nonlocal done
@@ -142,9 +177,9 @@ def tune(
         progress(done, total)
 
     with open_workers(workers, cluster) as open_, Store(folder / RUNS) as store:
-        result = tune_study(Bench(found, store, open_, step), seed, posterior, stage)
-    on = found.configuration if posterior is None else posterior.at_best(found.configuration)
-    write(folder, result, on)
+        result = tune_study(Bench(loaded, store, open_, step), seed, posterior, stage)
+    tuned_on = loaded.configuration
+    write(folder, result, tuned_on if posterior is None else posterior.at_best(tuned_on))
     return result
 
 
@@ -155,26 +190,32 @@ def stability(
     tau: float = 0.01,
     delay: bool = False,
 ) -> Stability:
-    """Whether a vehicle is stable on the rig with its lags, and how much of them it bears.
+    """Judge whether a vehicle is stable on the rig with lags, and which lags it tolerates.
 
     Parameters
     ----------
     vehicle
-        By name, such as "truck", or its figures.
+        Name, such as "truck", or a `QuarterCar`. Defaults to the vehicle of thesis Table 6.2.
     changes
-        Other values of it: {"suspension_damping": 500}.
+        Changed parameters of the vehicle in SI units, such as {"suspension_damping": 500}.
     tau
-        s, the lag of every path.
+        Time constant of the lag in every path, in s, 0.01 by default.
     delay
-        Whether the rightmost pole is with pure delays of tau instead.
+        Whether to compute the rightmost pole with pure delays of `tau` in place of lags.
+
+    Returns
+    -------
+    Stability
+        `models`, model → `ModelStability`: rightmost pole in 1/s, and critical lag and delay in s.
 
     Raises
     ------
     RigtwinError
-        For an unknown name, or a figure that no pole can be worked out for.
+        For an unknown vehicle or parameter, or values for which no pole can be computed.
     """
     car = _car(vehicle)
     for name, value in {**(changes or {}), "tau": tau}.items():
+        # Python counts True as 1, which would pass for a parameter.
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise RigtwinError(f"{name} = {value!r:.60}: expected a number")
     for name in changes or {}:
@@ -186,6 +227,7 @@ def stability(
 
 
 def _car(vehicle: str | QuarterCar) -> QuarterCar:
+    """Return a vehicle's parameters. Raises RigtwinError for an unknown vehicle."""
     car = find_vehicle(vehicle) if isinstance(vehicle, str) else vehicle
     if not isinstance(car, QuarterCar):
         raise RigtwinError(f"vehicle {car!r:.60}: expected a name, or a QuarterCar")
@@ -195,58 +237,72 @@ def _car(vehicle: str | QuarterCar) -> QuarterCar:
 def rig_margin(
     vehicle: str | QuarterCar = "quarter-car", *, compensator: str = "kalman-inverse"
 ) -> RigMargin:
-    """How stable a vehicle is on the rig as it runs, plain and with its plate's delay compensated.
+    """Judge the stability margin of a vehicle on the rig with its real sampled loop.
 
     Parameters
     ----------
     vehicle
-        By name, such as "truck", or its figures.
+        Name, such as "truck", or a `QuarterCar`.
     compensator
-        Of the plate's delay, as `controller.plate_compensator` takes it.
+        Name of the plate's delay compensator, a value of the setting
+        `controller.plate_compensator`.
+
+    Returns
+    -------
+    RigMargin
+        Real part of the slowest pole in 1/s, without and with compensation, and the additional
+        delay in s at which the compensated loop becomes unstable.
 
     Raises
     ------
     RigtwinError
-        For an unknown name, or a figure that no pole can be worked out for.
+        For an unknown vehicle or compensator, or values for which no pole can be computed.
     """
     try:
-        by = PlateCompensator.parse(compensator)
+        parsed = PlateCompensator.parse(compensator)
     except ValueError as error:
         raise RigtwinError(f"compensator {error}") from None
-    return judge_margin(check_plausible(_car(vehicle)), by)
+    return judge_margin(check_plausible(_car(vehicle)), parsed)
 
 
 def reproduce(
-    what: str | None = None,
+    part: str | None = None,
     *,
     seeds: int = 32,
     folder: str | Path = "reproduction",
     workers: int | None = None,
     cluster: str | None = None,
-    progress: Progress = _nothing,
+    progress: Progress = _ignore_progress,
 ) -> Reproduction:
-    """Reproduces the thesis: its tables, figures and statements beside ours.
+    """Reproduce the thesis: its tables, figures and statements beside the twin's.
 
     Parameters
     ----------
-    what
-        A chapter (3 to 7, A), study, table, figure or equation; everything by default.
+    part
+        Chapter (3 to 7, A), study, table, figure or equation, such as "table-4.2". Defaults to
+        everything.
     seeds
-        Roads and noise to judge over.
+        Number of roads and noise sequences for the judgement.
     folder
-        Of the results; what is there already is not computed again.
+        Folder of the results. Results that it contains are not computed again.
     workers, cluster
-        Processes on this computer, one a core by default; or the address of a dask cluster.
+        Number of processes on this computer, one per core by default; or the address of a dask
+        cluster.
     progress
-        Called with the jobs done and with how many there are.
+        Function called with the number of finished jobs and with their total.
+
+    Returns
+    -------
+    Reproduction
+        Tables, figures and statements, each with the thesis' value and the twin's.
 
     Raises
     ------
     RigtwinError
-        If nothing is called that, or the folder cannot be written.
+        If the part does not exist, or the folder cannot be written.
     """
     with open_workers(workers, cluster) as open_:
-        return reproduce_thesis(what, seeds, Path(folder), open_, progress)
+        return reproduce_thesis(part, seeds, Path(folder), open_, progress)
 
 
 def rths(
@@ -258,35 +314,39 @@ def rths(
     noise: Noise = NONE,
     seed: int = 1,
 ) -> list[HybridTest]:
-    """Runs the benchmark of real-time hybrid simulation: a building whose first column is real.
+    """Run the benchmark of real-time hybrid simulation: a building whose first column is real.
 
     Parameters
     ----------
     case
-        Of the building, 1 to 4.
+        Case of the building, 1 to 4.
     quake
-        elcentro, kobe or morgan.
+        Earthquake: "elcentro", "kobe" or "morgan".
     compensator
-        By name; an unknown one is answered with what there is.
+        Name of the delay compensator. The message about an unknown one lists them.
     plants
-        How many actuators and specimens: the nominal one first, the others drawn.
+        Number of plants (actuator and specimen), 1 to 1000. The first is the nominal one, the
+        others are drawn.
     noise
-        Of the converters, V rms.
+        Noise of the position and force converters, in V rms. Defaults to none.
     seed
-        Of the plants and of the noise.
+        Seed of the drawn plants and of the noise.
 
     Returns
     -------
-    list
-        Of each plant: the criteria J1 to J9, the largest force, motion and speed, and the signals.
+    list of HybridTest
+        Result of each plant: the criteria J1 (ms) and J2 to J9 (%), the largest force (N), motion
+        (m) and speed (m/s), and the signals.
 
     Raises
     ------
     RigtwinError
-        For an unknown case, earthquake or compensator, or a number of plants that makes no sense.
+        For an unknown case, earthquake or compensator, or a number of plants out of range.
     """
     building, law = find_case(case), find_compensator(compensator)
-    whole = all(isinstance(each, int) and not isinstance(each, bool) for each in (plants, seed))
+    whole = all(
+        isinstance(number, int) and not isinstance(number, bool) for number in (plants, seed)
+    )
     if not isinstance(noise, Noise):
         raise RigtwinError(f"noise {noise!r:.60}: expected a Noise of position and force, V")
     if not whole or not 1 <= plants <= MOST_PLANTS or seed < 0:
@@ -305,29 +365,35 @@ def blindcheck(
     baselines: bool = False,
     workers: int | None = None,
     cluster: str | None = None,
-    progress: Progress = _nothing,
+    progress: Progress = _ignore_progress,
 ) -> check.Result:
-    """Holds the diagnosis to recordings of another rig, whose defects are withheld from it.
+    """Check the diagnosis on recordings of an independent rig with withheld defects.
 
     Parameters
     ----------
     cases
-        How many rigs.
+        Number of rigs, at least 1.
     seed
-        Of the referee's draws.
+        Seed of the referee's draws.
     folder
-        Of recordings and answers; what is there already is not diagnosed again.
+        Folder of recordings and answers. Recordings with an answer are not diagnosed again.
     baselines
-        Whether cruder methods are asked too.
+        Whether to score simpler methods as well.
     workers, cluster
-        Processes on this computer, one a core by default; or the address of a dask cluster.
+        Number of processes on this computer, one per core by default; or the address of a dask
+        cluster.
     progress
-        Called with the recordings and answers done and with how many there are.
+        Function called with the number of finished recordings and answers and with their total.
+
+    Returns
+    -------
+    referee.check.Result
+        Answers beside the withheld defects.
 
     Raises
     ------
     RigtwinError
-        If the referee fails, or its key is not the one that it committed itself to.
+        If the referee fails, or its key does not match the digest that it published beforehand.
     """
     _check_draw(cases, seed)
     with open_workers(workers, cluster) as open_:
@@ -343,30 +409,36 @@ def blindcheck_machines(
     folder: str | Path = "blindcheck",
     workers: int | None = None,
     cluster: str | None = None,
-    progress: Progress = _nothing,
+    progress: Progress = _ignore_progress,
 ) -> wild.WildResult | arm.ArmResult:
-    """Holds the diagnosis to other machines than the rig, whose defects are withheld from it.
+    """Check the diagnosis on machines other than the rig, with withheld defects.
 
     Parameters
     ----------
     cases
-        How many machines.
+        Number of machines, at least 1.
     draw
-        "wild": machines whose physics have forms that the library does not have. "arm": joints that
-        act on each other.
+        Kind of the machines. "wild": their physics have forms that the library does not contain.
+        "arm": their joints act on each other.
     seed
-        Of the draws.
+        Seed of the draws.
     folder
-        Of the answers; what is there already is not diagnosed again.
+        Folder of the answers. Machines with an answer are not diagnosed again.
     workers, cluster
-        Processes on this computer, one a core by default; or the address of a dask cluster.
+        Number of processes on this computer, one per core by default; or the address of a dask
+        cluster.
     progress
-        Called with the machines done and with how many there are.
+        Function called with the number of finished machines and with their total.
+
+    Returns
+    -------
+    WildResult or ArmResult
+        Answers beside the withheld defects.
 
     Raises
     ------
     RigtwinError
-        For another draw, or if the folder cannot be written.
+        For an unknown draw, or if the folder cannot be written.
     """
     _check_draw(cases, seed)
     checks = {"wild": wild.check_wild, "arm": arm.check_arms}
@@ -382,6 +454,7 @@ def _check_draw(cases: int, seed: int) -> None:
 
 
 def _counting(progress: Progress, total: int) -> Callable[[int], None]:
+    """Return a function that adds up finished steps and reports them with their total."""
     done = 0
 
     def step(more: int) -> None:

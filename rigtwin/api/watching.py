@@ -1,4 +1,4 @@
-"""A twin beside a test that is running."""
+"""A running test compared with its twin."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from rigtwin.watching.watch import SHORTEST, STEP, WARM, WINDOW
 __all__ = ["Alarm", "Suspect", "Watch", "watch"]
 
 PATIENCE = 30.0
-"""s without anything new after which a recording without an end is given up; a session in real time
-takes some to begin."""
-LOOK = 0.05
-"""s from one look at the file to the next."""
+"""Time without new data after which an unfinished recording is given up, in s. A session in real
+time takes several seconds to begin."""
+POLL = 0.05
+"""Time between two looks at the file, in s."""
 
 
 def watch(
@@ -28,77 +28,91 @@ def watch(
     machine: Machine | str | Path | None = None,
     settings: Settings = (),
     without: Sequence[str] = (),
-    told: Callable[[Watch], object] = lambda _: None,
+    on_update: Callable[[Watch], object] = lambda _: None,
     suspects: bool = True,
     step: float = STEP,
     patience: float = PATIENCE,
     stop: Callable[[], bool] = lambda: False,
 ) -> Watch:
-    """Holds a recording against its twin while it is written, until its test ends; or, of one that
-    is whole, as fast as it goes.
+    """Compare a recording with its twin while it is being written, until its test ends.
+
+    A finished recording is compared as fast as the computer allows. The alarm is a CUSUM of every
+    sensor's residual in each frequency band.
 
     Parameters
     ----------
     path
-        Of the recording, an MCAP file that another program writes or is about to.
+        File of the recording, MCAP, which another program is writing or will write.
     machine
-        That it is of; by default the one that it names.
+        Machine the recording belongs to, or its name, or the path of its description. Defaults to
+        the one named in the recording.
     settings
-        Changes of the twin that it is compared with: of its plant and `timing.timestep`.
+        Changes of the twin before the comparison: of its plant and `timing.timestep`. All other
+        settings are the recording's own.
     without
-        Effects that are taken out of the twin first, such as "coulomb@rail".
-    told
-        Called whenever there is something new: a stretch that was judged, or suspects.
+        Effects of the nominal machine that are removed from the twin first, such as
+        "coulomb@rail".
+    on_update
+        Function called with the `Watch` after each judged interval and each search for suspects.
     suspects
-        Whether to look for what may be behind an alarm.
+        Whether to search for effects that may cause an alarm. Defaults to True.
     step
-        s of the test that are judged at a time, or more where judging takes longer.
+        Length of the interval that is judged at a time, in s, 0.5 by default. It grows where the
+        comparison takes longer than the test.
     patience
-        s without anything new after which the recording is given up.
+        Time without new data after which the recording is given up, in s, 30 by default.
     stop
-        Asked from time to time; the watch ends where it says so.
+        Function called between two looks at the file; the watch ends when it returns True.
 
     Returns
     -------
     Watch
-        As it ended; its `alarm` is None if there was no gap beyond noise and tolerances.
+        Watch at its end. `alarm` is None, or states sensor, time and suspects; `level` and
+        `highest` are the present and the highest CUSUM, where 1 raises an alarm; `seconds` is the
+        time that could be judged.
 
     Raises
     ------
     RigtwinError
-        If the file cannot be read, is of another machine, lacks a channel, nothing of it could be
-        judged, or nothing was added to it for longer than `patience` before its test ended.
+        If the file cannot be read, belongs to another machine, lacks a channel, or is too short to
+        be judged, or if nothing is added for longer than `patience` before the test ends.
+
+    Examples
+    --------
+    >>> watch = rigtwin.watch("test.mcap", on_update=lambda now: print(now.level))  # doctest: +SKIP
+    >>> print(watch.alarm)  # doctest: +SKIP
     """
     if not STEP <= step <= WINDOW - WARM:
-        raise RigtwinError(f"steps of {step:g} s; expected {STEP:g} to {WINDOW - WARM:g} s")
+        raise RigtwinError(f"step {step:g} s: expected {STEP:g} to {WINDOW - WARM:g} s")
     if not patience > 0.0:
-        raise RigtwinError(f"a patience of {patience:g} s; expected more than 0 s")
+        raise RigtwinError(f"patience {patience:g} s: expected more than 0 s")
     growing = GrowingRecording(Path(path), WINDOW + step)
-    watching, looked = None, time.monotonic()
+    watching, last_new = None, time.monotonic()
     while not stop():
-        here = time.monotonic()
-        if not growing.path.exists() and here - looked <= patience:
-            time.sleep(LOOK)
+        now = time.monotonic()
+        if not growing.path.exists() and now - last_new <= patience:
+            time.sleep(POLL)
             continue
-        # Where judging takes longer than the test, longer stretches are judged at a time.
-        grew = growing.read(growing.latest + max(step, here - looked))
+        # If judging takes longer than the interval itself, the interval grows, so that the watch
+        # keeps pace with the test.
+        grew = growing.read(growing.latest + max(step, now - last_new))
         if not grew and not growing.ended:
-            if here - looked > patience:
+            if now - last_new > patience:
                 raise RigtwinError(
                     f"{path}: nothing was added to it for {patience:g} s, and it does not say that "
                     "its test is over"
                 )
-            time.sleep(LOOK)
+            time.sleep(POLL)
             continue
-        looked = here
+        last_new = now
         recording = growing.recording()
         if watching is None:
-            found = described_machine(recording, machine)
-            watching = Watch(found, twin_of(found, settings, without))
+            described = described_machine(recording, machine)
+            watching = Watch(described, twin_of(described, settings, without))
         if watching.take(recording, last=growing.ended):
-            told(watching)
+            on_update(watching)
         if suspects and watching.investigate(recording, last=growing.ended):
-            told(watching)
+            on_update(watching)
         if growing.ended:
             break
     if watching is None or watching.gap is None:

@@ -26,7 +26,7 @@ ARM = "the check moves ground, structure and motor a little; everybody clear? ty
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     deeds = parser.add_subparsers(dest="deed", metavar="deed", required=True)
     serving = deeds.add_parser(
-        "serve", help="let the twin be the card of any NI-DAQmx gRPC client on this computer"
+        "serve", help="serve the twin as a card to NI-DAQmx gRPC clients on this computer"
     )
     serving.add_argument(
         "card",
@@ -38,70 +38,74 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--port", type=int, default=31763, help="default 31763; 0 takes a free one"
     )
     _add_machine(serving)
-    serving.add_argument("--seed", type=int, default=0, help="of the sensors' noise (default 0)")
+    serving.add_argument("--seed", type=int, default=0, help="seed of the sensor noise (default 0)")
     add_effect(serving, "give the rig an effect, e.g. coulomb@rail=80")
     add_settings(serving)
-    checking = deeds.add_parser("check", help="find zero, span and signs; write the channel table")
-    checking.add_argument(
-        "card", type=Path, metavar="CARD.toml", help="the channel table to begin with"
+    checking = deeds.add_parser(
+        "check", help="calibrate zero, span and signs; write the channel table"
     )
+    checking.add_argument("card", type=Path, metavar="CARD.toml", help="channel table to correct")
     checking.add_argument(
         "--out",
         "-o",
         type=Path,
         required=True,
         metavar="NEW.toml",
-        help="where to write what was found",
+        help="where to write the corrected table",
     )
-    checking.add_argument("--operator", required=True, metavar="NAME", help="who does it")
-    checking.add_argument("--note", default="", help="kept in the table")
+    checking.add_argument(
+        "--operator", required=True, metavar="NAME", help="name of the person who calibrates"
+    )
+    checking.add_argument("--note", default="", help="remark that is stored in the table")
     checking.add_argument(
         "--signs",
         action="store_true",
-        help="move each output a little and see which signal follows, and how",
+        help="move each output slightly and check which signals follow, with which sign",
     )
     checking.add_argument(
-        "--zero", action="store_true", help="as it stands now, every input reads its reference"
+        "--zero",
+        action="store_true",
+        help="every input is at its reference value now; set its zero",
     )
     checking.add_argument(
         "--reference",
         action="append",
         default=[],
         metavar="NAME=VALUE",
-        help="other than zero, with --zero",
+        help="reference value of an input that is not zero, with --zero",
     )
     checking.add_argument(
         "--span",
         action="append",
         default=[],
         metavar="NAME=VALUE",
-        help="as it stands now, it reads this",
+        help="present value of an input, from which its span is set",
     )
     checking.add_argument(
         "--stroke",
         type=float,
         default=0.005,
         metavar="M",
-        help="of the plates, with --signs (default 0.005)",
+        help="stroke of the plates in m, with --signs (default 0.005)",
     )
     checking.add_argument(
         "--moved",
         action="append",
         default=[],
         metavar="OUTPUT=+|-",
-        help="which way it went, if not asked",
+        help="direction of an output, in place of the question",
     )
     checking.add_argument(
-        "--arm", action="store_true", help="do not ask: everybody is clear of the rig"
+        "--arm", action="store_true", help="skip the question: everybody is clear of the rig"
     )
     checking.add_argument(
         "--virtual",
         type=Path,
         metavar="WIRING.toml",
-        help="on a virtual card that is wired like this",
+        help="check a virtual card that is wired by this table",
     )
     freeing = deeds.add_parser(
-        "release", help="free what a program that died has left on a gRPC device server"
+        "release", help="release the lines that a dead program holds on a gRPC device server"
     )
     freeing.add_argument("card", type=Path, metavar="CARD.toml")
     _add_machine(freeing)
@@ -112,7 +116,7 @@ def _add_machine(parser: argparse.ArgumentParser) -> None:
         "--machine",
         default=DEFAULT_MACHINE,
         metavar="F.toml",
-        help="on the card, by name or description (default: the suspension rig)",
+        help="machine on the card, by name or description (default: the suspension rig)",
     )
 
 
@@ -146,15 +150,15 @@ def _serve(parsed: argparse.Namespace) -> int:
 
 
 def _release(parsed: argparse.Namespace) -> int:
-    left = rigtwin.release_card(parsed.card, machine=parsed.machine)
-    done = "what a dead program had is free" if left else "nothing had been left"
+    released = rigtwin.release_card(parsed.card, machine=parsed.machine)
+    done = "lines of a dead program released" if released else "no lines were held"
     print(f"outputs at zero, power off; {done}")
     return 0
 
 
 def _check(parsed: argparse.Namespace) -> int:
     writable(parsed.out)
-    found = rigtwin.check_card(
+    check = rigtwin.check_card(
         parsed.card,
         operator=parsed.operator,
         note=parsed.note,
@@ -169,9 +173,9 @@ def _check(parsed: argparse.Namespace) -> int:
         virtual=parsed.virtual,
         show=_show,
     )
-    for line in found.said or (("every sign is right",) if parsed.signs else ()):
+    for line in check.changes or (("every sign is right",) if parsed.signs else ()):
         print(line)
-    rigtwin.write_table(found.table, parsed.out)
+    rigtwin.write_table(check.table, parsed.out)
     print(f"channel table in {parsed.out}")
     return 0
 
@@ -183,31 +187,31 @@ def _show(rest: Sequence[RestReading]) -> None:
 
 
 def _parse_values(texts: Sequence[str], option: str) -> dict[str, float]:
-    """input → value of each NAME=VALUE. Raises RigtwinError."""
-    found = dict[str, float]()
+    """Return input → value of each NAME=VALUE. Raises RigtwinError if a value is no number."""
+    values = dict[str, float]()
     for text in texts:
         name, _, value = text.partition("=")
         try:
-            found[name] = float(value)
+            values[name] = float(value)
         except ValueError:
             raise RigtwinError(
                 f"{option} {text}: expected NAME=NUMBER, such as structure_lvdt=0.1"
             ) from None
-    return found
+    return values
 
 
 def _parse_directions(texts: Sequence[str]) -> dict[str, int]:
-    """output → which way it went, of each OUTPUT=+ or OUTPUT=-; 0 for what is neither."""
+    """Return output → direction of each OUTPUT=+ (1) or OUTPUT=- (-1); 0 for any other text."""
     pairs = (text.partition("=") for text in texts)
     return {name: {"+": 1, "-": -1}.get(sign, 0) for name, _, sign in pairs}
 
 
 def _ask_direction(output: str) -> int:
-    what = {
+    motion = {
         "ground": "the ground plate go towards the wheel",
         "structure": "the structure plate go away from the wheel",
     }.get(output, "the motor push the plate away from the wheel")
-    return 1 if _ask(f"did {what} first? y/n: ", ("y", "n")) == "y" else -1
+    return 1 if _ask(f"did {motion} first? y/n: ", ("y", "n")) == "y" else -1
 
 
 def _ask(question: str, answers: tuple[str, ...]) -> str:

@@ -52,17 +52,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=int,
         default=4,
         metavar="N",
-        help="of each kind that kills a process (default 4)",
+        help="sessions of each kind that kills a process (default 4)",
     )
     parser.add_argument(
-        "--seed", type=int, default=0, help="of kinds' times, tests and places (default 0)"
+        "--seed",
+        type=int,
+        default=0,
+        help="seed of the faults' times, tests and places (default 0)",
     )
     parser.add_argument(
         "--card",
         type=Path,
         default=CARD,
         metavar="CARD.toml",
-        help="channel table (default the packaged one)",
+        help="channel table (default: the shipped one)",
     )
     add_settings(parser)
     parser.add_argument("--out", "-o", type=Path, metavar="F.md", help="write the table there")
@@ -84,36 +87,36 @@ def execute(parsed: argparse.Namespace) -> int:
         if out is not None:
             writable(out)
     with counting_bar("fault", "faults") as show:
-        found = rigtwin.faults(
+        campaign = rigtwin.faults(
             seed=parsed.seed,
-            each=parsed.each,
-            processes=parsed.processes,
+            per_kind=parsed.each,
+            per_process_kind=parsed.processes,
             card=parsed.card,
             settings=settings_of(parsed),
             progress=lambda _kind, done, total: show(done, total),
         )
     tried = {
-        kind: [result for result in found.results if result.fault.kind == kind] for kind in KINDS
+        kind: [result for result in campaign.results if result.fault.kind == kind] for kind in KINDS
     }
     rows = [_row(kind, results) for kind, results in tried.items() if results]
-    passed = len(found.results) - len(found.failed)
+    passed = len(campaign.results) - len(campaign.failed)
     said = (
-        f"{len(found.results)} faults of {len(rows)} kinds, seed {parsed.seed}: "
+        f"{len(campaign.results)} faults of {len(rows)} kinds, seed {parsed.seed}: "
         f"{passed} sessions ended as they must"
     )
     print(table([HEADER, *rows]))
-    for result in found.failed:
+    for result in campaign.failed:
         print(f"failed: {_describe(result)}")
-    for one in found.undone:
-        print(f"not run: {one}")
+    for reason in campaign.undone:
+        print(f"not run: {reason}")
     print(said)
-    if found.interrupted:
+    if campaign.interrupted:
         return 130
     if parsed.out is not None:
-        _write(parsed.out, said, rows, list(found.failed))
+        _write(parsed.out, said, rows, list(campaign.failed))
     if parsed.json is not None:
-        write_json(parsed.json, [asdict(result) for result in found.results])
-    return 0 if not found.failed and not found.undone else 4
+        write_json(parsed.json, [asdict(result) for result in campaign.results])
+    return 0 if not campaign.failed and not campaign.undone else 4
 
 
 def _row(kind: FaultKind, results: list[FaultResult]) -> tuple[str, ...]:

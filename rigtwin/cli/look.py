@@ -89,7 +89,7 @@ def _page(parsed: argparse.Namespace, out: Path) -> Page | LivePage:
             settings=settings_of(parsed),
             without=parsed.without,
             save_twin=out,
-            said=partial(print, flush=True),
+            on_message=partial(print, flush=True),
         )
     look = rigtwin.look(
         rigtwin.load(parsed.recording, parsed.machine),

@@ -77,7 +77,7 @@ def execute(parsed: argparse.Namespace) -> int:
         resume=parsed.resume,
         real=real,
         prepare=prepare,
-        told=lambda line: print(line, flush=True),
+        on_message=lambda line: print(line, flush=True),
     )
     return code
 
@@ -122,7 +122,7 @@ def _run_on_twin(parsed: argparse.Namespace, machine: Machine) -> int:
             find_experiment(machine, test.experiment).configuration,
             settings_of(_command_line(parsed, test)),
         ),
-        told=lambda line: print(line, flush=True),
+        on_message=lambda line: print(line, flush=True),
     )
     return code
 

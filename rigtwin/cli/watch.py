@@ -61,7 +61,7 @@ def execute(parsed: argparse.Namespace) -> int:
             machine=parsed.machine,
             settings=settings_of(parsed),
             without=parsed.without,
-            told=tell,
+            on_update=tell,
             **({} if parsed.patience is None else {"patience": parsed.patience}),
         )
     if watch.alarm is not None:
