@@ -345,7 +345,7 @@ def test_regions_are_told_apart():
 
 
 @pytest.mark.parametrize(
-    ("unit", "said"), [("m", "within 33 mm after"), ("rad", "within 1.9 ° after")]
+    ("unit", "said"), [("m", "within 33 mm after"), ("rad", "within 1.9° after")]
 )
 def test_a_way_after_a_reversal_is_in_the_unit_of_the_joint(unit, said):
     time = np.arange(8000) * 1e-3

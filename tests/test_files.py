@@ -185,7 +185,7 @@ def test_a_recording_needs_a_file_before_the_test_runs(tmp_path, capsys, monkeyp
     """It is read again when it is whole, which neither a device nor a pipe can be."""
     os.mkfifo(tmp_path / "pipe")
     path = out.format(folder=tmp_path)
-    monkeypatch.setattr("rigtwin.api.running._record", pytest.fail)
+    monkeypatch.setattr("rigtwin.rig.physics.SuspensionRig.record", pytest.fail)
     assert main(["run", "drop", "--out", path]) == 1
     said = capsys.readouterr().err
     assert said == f"rigtwin: cannot record to {path}: it is no file but a device or a pipe\n"

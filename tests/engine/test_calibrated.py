@@ -77,7 +77,7 @@ def test_the_file_has_the_changes_the_settings_of_the_controller_and_the_posteri
     assert lines[:3] == [
         "# explained: It rubs.",
         "# from a.mcap",
-        "# the controller's kp was 3, told 2",
+        "# the controller's kp was 3, configured as 2",
     ]
     table = tomllib.loads(text)
     # A controller that compensates the plate's delay is told of the computer's delay too.

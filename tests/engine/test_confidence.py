@@ -81,7 +81,7 @@ def posterior_of(value: float, rest: float, reach: list[float]) -> Any:
         accounts=np.array([0.9, 0.3]),
     )
     return SimpleNamespace(
-        best=best, rest=rest, inclusion=lambda effect: 0.87, margin=lambda effect: 12.0
+        best=best, residual_excess=rest, inclusion=lambda effect: 0.87, margin=lambda effect: 12.0
     )
 
 
