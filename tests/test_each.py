@@ -150,7 +150,7 @@ def test_copies_of_a_recording_have_their_own_names(folder: Path, tmp_path: Path
 def test_answers_of_another_shape_are_one_line(kept: str, folder: Path, tmp_path: Path) -> None:
     one = files(folder)[:1]
     rigtwin.diagnose_each(one, tmp_path, workers=1)
-    base = sqlite3.connect(tmp_path / each.KEPT)
+    base = sqlite3.connect(tmp_path / each.STORE)
     base.execute("UPDATE results SET result = ?", (kept,))
     base.commit()
     base.close()
