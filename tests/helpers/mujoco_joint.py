@@ -118,7 +118,7 @@ class MujocoModel(JointModel):
         self,
         plant: Plant,
         mover: Pusher,
-        besides: Array,
+        disturbance: Array,
         noise: Array | None = None,
         start: Start | None = None,
     ) -> Array:
@@ -132,9 +132,9 @@ class MujocoModel(JointModel):
         held = hold(drive, float(self._command[0]))
         law, wanted = push_law(mover), float(held.memory[3])
         follows = law.position_gain > 0.0
-        out, force = np.zeros((4, len(besides))), 0.0
+        out, force = np.zeros((4, len(disturbance))), 0.0
         loop = self._reader(plant)
-        for tick in range(len(besides)):
+        for tick in range(len(disturbance)):
             x, v = float(data.qpos[place]), float(data.qvel[at])
             out[0, tick], out[1, tick] = x, v
             out[2, tick] = push(law, wanted, x, v) if follows else force
@@ -150,7 +150,7 @@ class MujocoModel(JointModel):
                 passive.act(model, data, at, x, v, force)
                 # MuJoCo's own damping is implicit.
                 model.dof_damping[at] += held_by
-                data.qfrc_applied[at] += force + float(besides[tick])
+                data.qfrc_applied[at] += force + float(disturbance[tick])
                 mujoco.mj_step(model, data)
         return out
 
