@@ -91,9 +91,9 @@ def diagnose(
     Returns
     -------
     Diagnosis
-        Answer: `verdict` ("no gap", "explained", "partly explained", "unknown" or "unusable"),
-        `sentence`, `effects` with value, 95 % interval and confidence, `where` the gap lies, and
-        the `gap` before and after the correction, in units of white noise (1 is noise alone).
+        Answer: ``verdict`` ("no gap", "explained", "partly explained", "unknown" or "unusable"),
+        ``sentence``, ``effects`` with value, interval and confidence, ``where`` the gap lies, and
+        the ``gap`` before and after the correction, in units of white noise (1 is noise alone).
         `report(path)` writes a report, `save_twin(path)` the corrected twin, and `machine` is the
         corrected machine. In a notebook it shows its report.
 
@@ -273,8 +273,8 @@ def compare(
     Comparison
         `replays`, replay → `Residual` with the residual's rms, its noise floor (both in `unit`),
         their `ratio` (1 is noise alone) and the band of most of its power in Hz; `left_out`,
-        replay → reason why it was impossible; `notes`; `gap`, the rms of all residuals in units of
-        white noise.
+        replay → reason why it was impossible; ``notes``; ``gap``, the rms of all residuals in units
+        of white noise.
 
     Raises
     ------

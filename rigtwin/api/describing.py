@@ -38,8 +38,8 @@ def describe(
         CSV, JSON, MATLAB or parquet file, or several that are put side by side, row by row.
     columns
         Statements about the log that override its reading. "elbow.position" → a column with or
-        without sign and unit ("-q2 [deg]"), a formula of columns, or "none"; "*.position" → a unit
-        ("[deg]"); "time" → a column with its unit, or the period in s.
+        without sign and unit ("-q2 [deg]"), a formula of columns, or "none"; ``"*.position"`` → a
+        unit ("[deg]"); "time" → a column with its unit, or the period in s.
     test
         Kind of the test: "inverse dynamics", "position commands", "servos" or "force commands".
         Defaults to the kind that the columns imply.
