@@ -158,12 +158,12 @@ def _tuning(parsed: argparse.Namespace) -> int:
     ):
 
         def show(case: TuningCase) -> None:
-            told = f"withheld {case.defect}; diagnosed: {case.sentence}"
-            bar.write(f"rig {case.number + 1}: {told}", file=sys.stdout)
+            outcome = f"withheld {case.defect}; diagnosed: {case.sentence}"
+            bar.write(f"rig {case.number + 1}: {outcome}", file=sys.stdout)
 
         bench = Bench(study, store, workers, bar.update)
-        found = check(bench, cases, parsed.seed, stage=bar.set_description, show=show)
-    print(text(study, found))
+        cases_tuned = check(bench, cases, parsed.seed, stage=bar.set_description, show=show)
+    print(text(study, cases_tuned))
     if parsed.json is not None:
-        write_json(parsed.json, document(study, found))
+        write_json(parsed.json, document(study, cases_tuned))
     return 0

@@ -32,18 +32,19 @@ def execute(parsed: argparse.Namespace) -> int:
         writable(parsed.out)
     for note in recording.notes:
         print(f"note: {note}")
-    found = rigtwin.calibrate(recording)
+    calibration = rigtwin.calibrate(recording)
     print(
-        f"{recording.path}: Coulomb friction of the motor {found.friction:.1f} N, "
-        f"from {found.reversals} reversals"
+        f"{recording.path}: Coulomb friction of the motor {calibration.friction:.1f} N, "
+        f"from {calibration.reversals} reversals"
     )
     print(
-        f"tried on the recording: {found.detected} of {found.reversals} reversals detected, "
-        f"{found.false} false steps, {1e3 * found.delay:.0f} ms after the reversal"
+        f"tried on the recording: {calibration.detected} of {calibration.reversals} reversals "
+        f"detected, "
+        f"{calibration.false} false steps, {1e3 * calibration.delay:.0f} ms after the reversal"
     )
     if parsed.out is None:
-        print(found.toml(), end="")
+        print(calibration.toml(), end="")
     else:
-        atomic_write(parsed.out, found.toml())
+        atomic_write(parsed.out, calibration.toml())
         print(f"settings in {parsed.out}, for --config")
     return 0

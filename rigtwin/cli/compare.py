@@ -44,9 +44,9 @@ def execute(parsed: argparse.Namespace) -> int:
                 "--set, --config and --effect change the twin; "
                 "two recordings are compared without one"
             )
-        other = rigtwin.load(parsed.other)
-        results, differences = rigtwin.compare_recordings(recording, other)
-        notes = (*recording.notes, *other.notes, *differences)
+        second = rigtwin.load(parsed.other)
+        results, differences = rigtwin.compare_recordings(recording, second)
+        notes = (*recording.notes, *second.notes, *differences)
         print(f"{recording.path} against {parsed.other}, tick against tick")
     else:
         comparison = _compare(recording, parsed)

@@ -180,9 +180,9 @@ def execute(parsed: argparse.Namespace) -> int:
     elif parsed.save_twin is not None:
         said.append(f"{parsed.save_twin} not written: the data cannot be diagnosed")
     if parsed.save_mjcf is not None and diagnosis.effects:
-        left = diagnosis.save_mjcf(parsed.save_mjcf)
+        omitted = diagnosis.save_mjcf(parsed.save_mjcf)
         said.append(f"corrected MJCF in {parsed.save_mjcf}")
-        said += [f"  not in it, as MJCF has no attribute for it: {each}" for each in left]
+        said += [f"  not in it, as MJCF has no attribute for it: {each}" for each in omitted]
     elif parsed.save_mjcf is not None:
         said.append(f"{parsed.save_mjcf} not written: there is nothing to correct")
     print("\n".join(said))

@@ -16,18 +16,18 @@ OUTPUTS = ("out", "json", "html", "pdf", "png", "draw", "save_twin", "save_mjcf"
 
 def check_files(parsed: argparse.Namespace) -> None:
     """Raises RigtwinError if writing one of a command's files would lose another."""
-    given = vars(parsed)
-    outputs = {name: path for name in OUTPUTS if isinstance(path := given.get(name), Path)}
-    read = [value for name, value in given.items() if name not in outputs]
+    arguments = vars(parsed)
+    outputs = {name: path for name in OUTPUTS if isinstance(path := arguments.get(name), Path)}
+    read = [value for name, value in arguments.items() if name not in outputs]
     inputs = [path for value in read for path in _files(value)]
     if any(path.exists() for path in outputs.values()):
-        inputs += _machine_files(given.get("machine"))
+        inputs += _machine_files(arguments.get("machine"))
     seen: dict[Path, str] = {}
     for name, path in outputs.items():
         option = f"--{name.replace('_', '-')}"
         forbid_overwriting(path, *inputs)
-        if (other := seen.setdefault(path.resolve(), option)) != option:
-            raise RigtwinError(f"{other} and {option} are both {path}; one would be lost")
+        if (first := seen.setdefault(path.resolve(), option)) != option:
+            raise RigtwinError(f"{first} and {option} are both {path}; one would be lost")
 
 
 def _machine_files(name: object) -> tuple[Path, ...]:
@@ -45,8 +45,8 @@ def _machine_files(name: object) -> tuple[Path, ...]:
 def _files(value: object) -> Iterator[Path]:
     """The files that an argument names; a machine is a name or a file."""
     if isinstance(value, list):
-        for each in value:
-            yield from _files(each)
+        for item in value:
+            yield from _files(item)
     elif isinstance(value, str | Path):
         path = Path(value)
         try:

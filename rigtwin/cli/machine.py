@@ -45,14 +45,14 @@ def execute(parsed: argparse.Namespace) -> int:
     from rigtwin.description.document import examine
 
     path: Path = shipped().get(str(parsed.description)) or parsed.description
-    found, mistakes = examine(path)
+    machine, mistakes = examine(path)
     for mistake in mistakes:
         print(f"{path}: {mistake}")
-    if found is None:
+    if machine is None:
         print(f"{len(mistakes)} mistake{'s' if len(mistakes) > 1 else ''}")
         return 1
-    print(f"{found.name}: {found.title}")
-    for replay in found.replays:
+    print(f"{machine.name}: {machine.title}")
+    for replay in machine.replays:
         closed = ", commanded by the controller" if replay.closed else ""
         print(
             f"  {replay.name}: moved by {', '.join(replay.moved_by)}{closed}; "
@@ -61,27 +61,27 @@ def execute(parsed: argparse.Namespace) -> int:
     rows = [
         ("component", "is", "recorded as", "nominal values with a tolerance", "effects looked for")
     ]
-    effects = [effect for effect in found.effects() if effect.searched]
-    for name, component in found.components.items():
-        held = [t for t in found.tolerances if t.group == name and not t.ticks]
-        part = getattr(found.plant, name)
+    effects = [effect for effect in machine.effects() if effect.searched]
+    for name, component in machine.components.items():
+        held = [t for t in machine.tolerances if t.group == name and not t.ticks]
+        part = getattr(machine.plant, name)
         values = ", ".join(
             f"{t.parameter} {getattr(part, t.parameter):g} ± "
             + (f"{100 * t.half_width:g} %" if t.relative else f"{t.half_width:g}")
             for t in held
         )
-        own = ", ".join(effect.kind.name for effect in effects if effect.group == name)
+        kinds = ", ".join(effect.kind.name for effect in effects if effect.group == name)
         channel = ".".join(component.channel) if component.channel else ""
-        rows.append((name, f"{component.element} {component.mjcf}", channel, values, own))
+        rows.append((name, f"{component.element} {component.mjcf}", channel, values, kinds))
     print(table(rows))
-    for name, source in found.sources.items():
+    for name, source in machine.sources.items():
         print(f"{name}: {source}")
-    if found.control is not None:
-        print(f"controller: {found.control.text}")
-    for line in found.overlooked:
+    if machine.control is not None:
+        print(f"controller: {machine.control.text}")
+    for line in machine.overlooked:
         print(f"not taken into account: {line}")
     print("no mistakes", flush=True)
-    _print_never(found, math.inf if parsed.identifiability else ALLOWED)
+    _print_never(machine, math.inf if parsed.identifiability else ALLOWED)
     return 0
 
 
@@ -96,8 +96,8 @@ def _print_never(machine: Machine, seconds: float) -> None:
         print("never identifiable: not worked out; give its joints a range")
     for name in can.unseen:
         print(f"never identifiable: {name}; nothing that is recorded changes with it")
-    for name, others in can.confounded.items():
-        print(f"never identifiable alone: {name}; {' + '.join(others)} would do the same")
+    for name, rivals in can.confounded.items():
+        print(f"never identifiable alone: {name}; {' + '.join(rivals)} would do the same")
     if can.untried:
         print(
             f"not worked out within {seconds:g} s, --identifiability goes on: "
@@ -105,8 +105,8 @@ def _print_never(machine: Machine, seconds: float) -> None:
         )
     if can.motions and not can.unseen and not can.confounded and not can.untried:
         print("never identifiable: none; what a recording does not excite, its diagnosis says")
-    for each in can.sums:
-        print(f"seen of bodies and rotors: {_write_sum(each)}")
+    for base_parameter in can.sums:
+        print(f"seen of bodies and rotors: {_write_sum(base_parameter)}")
 
 
 @contextmanager
@@ -132,7 +132,7 @@ def _telling() -> Iterator[Callable[[str], None]]:
 
 def _write_sum(terms: Mapping[str, float]) -> str:
     """A sum as it is written by hand."""
-    first, *others = terms
+    first, *remaining = terms
     return first + "".join(
-        f" {'-' if terms[name] < 0.0 else '+'} {abs(terms[name]):.4g} {name}" for name in others
+        f" {'-' if terms[name] < 0.0 else '+'} {abs(terms[name]):.4g} {name}" for name in remaining
     )

@@ -18,10 +18,11 @@ def execute(_parsed: argparse.Namespace) -> int:
     import rigtwin
 
     machines = [rigtwin.machine(name) for name in rigtwin.machines()]
-    print(table([("machine", "title"), *((each.name, each.title) for each in machines)]))
-    for each in machines:
-        observed = ", ".join(row.name for row in each.rows)
+    print(table([("machine", "title"), *((machine.name, machine.title) for machine in machines)]))
+    for machine in machines:
+        observed = ", ".join(row.name for row in machine.rows)
         print(
-            f"\n{each.name}\n  components  {', '.join(each.components)}\n  observed    {observed}"
+            f"\n{machine.name}\n  components  {', '.join(machine.components)}\n"
+            f"  observed    {observed}"
         )
     return 0

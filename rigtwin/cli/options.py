@@ -96,15 +96,15 @@ def read_recordings(
     from rigtwin.errors import RigtwinError
 
     stated = columns_of(parsed)
-    paths, apart = parsed.recordings, parsed.held_out
+    paths, held_out = parsed.recordings, parsed.held_out
     if not is_model(parsed.machine):
         if stated or parsed.test:
             raise RigtwinError("--column and --test: of logs beside a model, --machine arm.xml")
         load = rigtwin.load
-        return [load(p, parsed.machine) for p in paths], [load(p, parsed.machine) for p in apart]
+        return [load(p, parsed.machine) for p in paths], [load(p, parsed.machine) for p in held_out]
     described = rigtwin.describe(parsed.machine, paths[0], columns=stated, test=parsed.test)
     print(described, file=sys.stderr)
-    return [record_log(described, p) for p in paths], [record_log(described, p) for p in apart]
+    return [record_log(described, p) for p in paths], [record_log(described, p) for p in held_out]
 
 
 def add_workers(parser: argparse.ArgumentParser) -> None:

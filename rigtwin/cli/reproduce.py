@@ -63,7 +63,7 @@ def execute(parsed: argparse.Namespace) -> int:
     if pictures.exists() and not pictures.is_dir():
         raise RigtwinError(f"cannot draw into {pictures}: it is a file")
     with counting_bar("job", "reproduce") as progress:
-        found = rigtwin.reproduce(
+        reproduction = rigtwin.reproduce(
             " ".join(parsed.what) or None,
             seeds=parsed.seeds,
             folder=parsed.folder,
@@ -71,17 +71,17 @@ def execute(parsed: argparse.Namespace) -> int:
             cluster=parsed.cluster,
             progress=progress,
         )
-    print(found.text())
+    print(reproduction.text())
     if parsed.json is not None:
-        write_json(parsed.json, found.document())
+        write_json(parsed.json, reproduction.document())
     if parsed.html is not None:
-        print(f"\nlook at {found.page(parsed.html)}")
-    drawn = found.draw(pictures)
+        print(f"\nlook at {reproduction.page(parsed.html)}")
+    drawn = reproduction.draw(pictures)
     if len(drawn) == 1:
         [(out, covers)] = drawn.items()
         print(f"\n{covers} drawn in {out}")
     elif drawn:
         print(f"\n{len(drawn)} figures drawn in {pictures}")
     if parsed.gallery is not None:
-        print(f"\ngallery in {found.gallery(parsed.gallery)}")
+        print(f"\ngallery in {reproduction.gallery(parsed.gallery)}")
     return 0

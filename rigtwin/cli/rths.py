@@ -96,7 +96,7 @@ def _tune(parsed: argparse.Namespace) -> int:
     plants = 8 if parsed.plants is None else parsed.plants
     shown = {"unit": "evaluation", "desc": f"tuning {parsed.compensator}", "leave": False}
     with tqdm(total=parsed.evaluations + 1, disable=None, **shown) as bar:
-        found = rigtwin.tune_compensator(
+        tuned = rigtwin.tune_compensator(
             parsed.compensator,
             parsed.case,
             quake=parsed.quake,
@@ -107,16 +107,16 @@ def _tune(parsed: argparse.Namespace) -> int:
             progress=bar.update,
         )
     rows: list[tuple[str, ...]] = [("", "before", "after")]
-    rows += [(k, f"{v:.4g}", f"{found.after[k]:.4g}") for k, v in found.before.items()]
-    for told, pair in (
-        ("criterion, on the plants it was tuned on, %", found.criterion),
-        ("J2 without noise, worst of the others, %", found.judged),
-        ("J2 with noise above its floor, points", found.noisy),
+    rows += [(k, f"{v:.4g}", f"{tuned.after[k]:.4g}") for k, v in tuned.before.items()]
+    for label, pair in (
+        ("criterion, on the plants it was tuned on, %", tuned.criterion),
+        ("J2 without noise, worst of the others, %", tuned.judged),
+        ("J2 with noise above its floor, points", tuned.noisy),
     ):
-        rows.append((told, *(f"{value:.3f}" for value in pair)))
+        rows.append((label, *(f"{value:.3f}" for value in pair)))
     print(table(rows))
     if parsed.json is not None:
-        write_json(parsed.json, asdict(found))
+        write_json(parsed.json, asdict(tuned))
     return 0
 
 

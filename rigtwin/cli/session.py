@@ -137,8 +137,8 @@ def _compare(path: Path, machine: str | None = None) -> None:
     """Says where the rig and the twin disagree, at once."""
     from rigtwin.cli.compare import execute as compare
 
-    nothing = {"other": None, "json": None, "machine": machine, "config": None}
+    defaults = {"other": None, "json": None, "machine": machine, "config": None}
     try:
-        compare(argparse.Namespace(recording=path, effect=[], set=[], **nothing))
+        compare(argparse.Namespace(recording=path, effect=[], set=[], **defaults))
     except RigtwinError as error:
         print(f"not compared: {error}")

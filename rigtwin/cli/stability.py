@@ -88,10 +88,10 @@ def execute(parsed: argparse.Namespace) -> int:
     )
     from rigtwin.studies.stability.tested import AS_RUN
 
-    found = rigtwin.stability(
+    stability = rigtwin.stability(
         parsed.vehicle, changes=_numbers(parsed.set), tau=parsed.tau, delay=parsed.delay
     )
-    car, tau = found.vehicle, found.tau
+    car, tau = stability.vehicle, stability.tau
     out = parsed.out or Path("stability.png")
     if parsed.out is not None and parsed.map is None:
         raise RigtwinError(f"-o {parsed.out}: expected --map X Y, the parameters to draw it over")
@@ -113,7 +113,7 @@ def execute(parsed: argparse.Namespace) -> int:
     points = SPARSE if model in AS_RUN else POINTS
     axes = [around(name, car, tau, points) for name in parsed.map or ()]
     print(", ".join(f"{name.replace('_', ' ')} {value:g}" for name, value in car._asdict().items()))
-    print(_printed(found))
+    print(_printed(stability))
     at_rig = rigtwin.stability(car, tau=RIG_LAG).models["rig"]
     words = "stable" if at_rig.stable else "unstable"
     print(
@@ -130,7 +130,7 @@ def execute(parsed: argparse.Namespace) -> int:
             {
                 "vehicle": car._asdict(),
                 "tau": tau,
-                "models": {name: asdict(each) for name, each in found.models.items()},
+                "models": {name: asdict(each) for name, each in stability.models.items()},
                 "rig_at_10_ms": asdict(at_rig),
                 "as_run": asdict(margin),
             },
@@ -139,22 +139,22 @@ def execute(parsed: argparse.Namespace) -> int:
 
 
 def _numbers(assignments: list[str]) -> dict[str, float]:
-    found = {}
+    numbers = {}
     for assignment in assignments:
         name, _, text = assignment.partition("=")
         try:
-            found[name] = float(text)
+            numbers[name] = float(text)
         except ValueError:
             raise RigtwinError(f"--set {assignment}: expected a number after {name}=") from None
-    return found
+    return numbers
 
 
-def _printed(found: Stability) -> str:
-    kind = "delays" if found.delay else "lags"
+def _printed(stability: Stability) -> str:
+    kind = "delays" if stability.delay else "lags"
     lines: list[tuple[str, ...]] = [
         (
             "model",
-            f"rightmost pole, {kind} of {1e3 * found.tau:g} ms",
+            f"rightmost pole, {kind} of {1e3 * stability.tau:g} ms",
             "stable",
             "critical lag",
             "at",
@@ -162,7 +162,7 @@ def _printed(found: Stability) -> str:
             "at",
         )
     ]
-    for name, model in found.models.items():
+    for name, model in stability.models.items():
         times = [
             *_time(model.critical_lag, model.critical_lag_frequency),
             *_time(model.critical_delay, model.critical_delay_frequency),
@@ -172,11 +172,11 @@ def _printed(found: Stability) -> str:
 
 
 def _margin(margin: rigtwin.RigMargin) -> str:
-    told = f"slowest motion {-margin.plain:+.2g} 1/s plain, "
-    told += f"{-margin.compensated:+.2g} 1/s with the plate's delay compensated"
+    text = f"slowest motion {-margin.plain:+.2g} 1/s plain, "
+    text += f"{-margin.compensated:+.2g} 1/s with the plate's delay compensated"
     if margin.delay_margin is None:
-        return f"{told}, unstable with that too"
-    return f"{told}, stable with {1e3 * margin.delay_margin:.2g} ms more delay than it is told of"
+        return f"{text}, unstable with that too"
+    return f"{text}, stable with {1e3 * margin.delay_margin:.2g} ms more delay than it is told of"
 
 
 def _time(time: float | None, frequency: float | None) -> tuple[str, str]:

@@ -94,7 +94,7 @@ def run(parsed: argparse.Namespace, name: str, path: Path) -> int:
     """Runs a test under supervision and tells how it ended. Returns the exit code."""
     test = plan(parsed, name)
     with _bar(test) as bar:
-        given: dict[str, Any] = {
+        options: dict[str, Any] = {
             "path": path,
             "machine": parsed.machine,
             "seed": parsed.seed,
@@ -103,10 +103,10 @@ def run(parsed: argparse.Namespace, name: str, path: Path) -> int:
             "progress": bar.update,
         }
         if parsed.target == "daq" and parsed.dry_run:
-            rehearsed = rigtwin.dry_run(name, parsed.card, effects=parsed.effect, **given)
+            rehearsed = rigtwin.dry_run(name, parsed.card, effects=parsed.effect, **options)
             bar.close()
             return _tell_dry_run(parsed, test, path, rehearsed)
-        given["live"] = parsed.live
+        options["live"] = parsed.live
         if parsed.target == "daq":
             if parsed.effect:
                 raise RigtwinError("--effect is the twin's; the rig has its own")
@@ -115,11 +115,11 @@ def run(parsed: argparse.Namespace, name: str, path: Path) -> int:
                 parsed.card,
                 arm=lambda ready: parsed.arm or _ask_to_arm(ready),
                 without_dry_run=parsed.without_dry_run,
-                **given,
+                **options,
             )
         else:
             ended = rigtwin.run_on_twin(
-                name, card=parsed.card, real_time=parsed.real_time, effects=parsed.effect, **given
+                name, card=parsed.card, real_time=parsed.real_time, effects=parsed.effect, **options
             )
     if ended is None:
         print("not armed; nothing moved")
@@ -127,20 +127,20 @@ def run(parsed: argparse.Namespace, name: str, path: Path) -> int:
     return _tell(test, path, ended.ticks, ended.cause, ended.completed)
 
 
-def _tell_dry_run(parsed: argparse.Namespace, test: AnyTest, path: Path, found: DryRun) -> int:
+def _tell_dry_run(parsed: argparse.Namespace, test: AnyTest, path: Path, rehearsal: DryRun) -> int:
     from rigtwin.hardware.session.dry_run import ledger
 
-    ticks = found.recording.ticks if found.recording is not None else 0
-    code = _tell(test, path, ticks, found.cause, found.passed)
-    if found.peaks:
+    ticks = rehearsal.recording.ticks if rehearsal.recording is not None else 0
+    code = _tell(test, path, ticks, rehearsal.cause, rehearsal.passed)
+    if rehearsal.peaks:
         rows: list[tuple[str, ...]] = [("predicted", "peak", "limit", "margin")]
-        for peak in found.peaks:
+        for peak in rehearsal.peaks:
             values = (f"{peak.peak:.4g} {peak.unit}", f"{peak.limit:g} {peak.unit}")
             rows.append((peak.name, *values, f"{100 * peak.margin:.0f} %"))
         print(table(rows))
-    for lacking in found.obstacles:
+    for lacking in rehearsal.obstacles:
         print(f"before it may be armed: {lacking}")
-    if found.passed and not test.effects and ledger(parsed.card).exists():
+    if rehearsal.passed and not test.effects and ledger(parsed.card).exists():
         print(f"dry run passed, noted in {ledger(parsed.card)}")
     return code
 

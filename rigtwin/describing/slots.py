@@ -62,15 +62,15 @@ class Slots:
         Question
             If two columns fit equally well.
         """
-        offers = sorted(self._matches[joint, quantity], key=lambda each: -each.rank)
-        offers = [each for each in offers if each.rank > offers[0].rank - TIE]
+        offers = sorted(self._matches[joint, quantity], key=lambda candidate: -candidate.rank)
+        offers = [candidate for candidate in offers if candidate.rank > offers[0].rank - TIE]
         if len(offers) > 1:
-            plain = [each for each in offers if self._is_si(each.column, quantity)]
+            plain = [candidate for candidate in offers if self._is_si(candidate.column, quantity)]
             offers = plain or offers
-        values = [self._columns.values[each.column] for each in offers]
-        if all(np.array_equal(values[0], each, equal_nan=True) for each in values[1:]):
+        values = [self._columns.values[candidate.column] for candidate in offers]
+        if all(np.array_equal(values[0], candidate, equal_nan=True) for candidate in values[1:]):
             return offers[0]
-        names = [each.column for each in offers]
+        names = [candidate.column for candidate in offers]
         key = f"{joint}.{quantity.value}"
         raise ask(
             f"columns {enumerate_names(names)} could all be {key}; which is it?",

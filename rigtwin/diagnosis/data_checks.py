@@ -78,38 +78,40 @@ def find_faults(
     configuration: Configuration,
     least: int = SHORTEST,
 ) -> tuple[Fault, ...]:
-    """All faults of a recording.
+    """Find all faults of a recording.
 
     Parameters
     ----------
     machine
-        That it should be of.
+        Machine the recording should belong to.
     recording
-        The data.
+        Data to check.
     configuration
-        Of the twin, see `Machine.configuration_of`.
+        Settings of the twin, see `Machine.configuration_of`.
     least
-        Ticks that the recording must have. Fewer suffice among others, see `least_ticks`.
+        Ticks that the recording must have. Fewer suffice in a set, see `least_ticks`.
 
     Returns
     -------
-    Faults, the gravest first. Later checks are left out where earlier ones make them meaningless.
+    tuple of Fault
+        Faults, the gravest first. Later checks are skipped where earlier faults make them
+        meaningless.
     """
-    found = [*_check_presence(machine, recording, least)]
-    if not found:
-        found += _check_values(machine, recording)
-    if not found:
+    faults = [*_check_presence(machine, recording, least)]
+    if not faults:
+        faults += _check_values(machine, recording)
+    if not faults:
         predicted = machine.physics.model(machine, recording.inputs, configuration, STEPS).predict(
             configuration.plant
         )
-        found += _check_alive(machine, recording, predicted)
-        if not any(fault.fatal for fault in found):
-            found += _check_order(machine, recording, predicted)
-        if not any(fault.fatal for fault in found):
-            found += _check_inputs(machine, recording, configuration, predicted)
-        if not any(fault.fatal for fault in found):
-            found += _check_scale(machine, recording, predicted)
-    return tuple(sorted(found, key=lambda fault: not fault.fatal))
+        faults += _check_alive(machine, recording, predicted)
+        if not any(fault.fatal for fault in faults):
+            faults += _check_order(machine, recording, predicted)
+        if not any(fault.fatal for fault in faults):
+            faults += _check_inputs(machine, recording, configuration, predicted)
+        if not any(fault.fatal for fault in faults):
+            faults += _check_scale(machine, recording, predicted)
+    return tuple(sorted(faults, key=lambda fault: not fault.fatal))
 
 
 def require_fit(
@@ -128,15 +130,15 @@ def require_fit(
 
 def channels(machine: Machine) -> list[tuple[str, str]]:
     """(topic, field) of everything that a diagnosis of the machine reads, in order."""
-    found = []
+    required = []
     for replay in machine.replays:
         movers = [machine.components[name].channel for name in replay.moved_by]
-        found += [channel for channel in movers if channel is not None and not replay.closed]
-        found += [row.channel for row in replay.rows]
+        required += [channel for channel in movers if channel is not None and not replay.closed]
+        required += [row.channel for row in replay.rows]
     if machine.control is not None:
-        found += machine.control.channels
-        found += [("/command", name) for name in machine.control.outputs]
-    return list(dict.fromkeys(found))
+        required += machine.control.channels
+        required += [("/command", name) for name in machine.control.outputs]
+    return list(dict.fromkeys(required))
 
 
 def _check_presence(machine: Machine, recording: Recording, least: int) -> Iterator[Fault]:
@@ -352,20 +354,20 @@ def _unexplained_scales(
     machine: Machine, recording: Recording, odd: Mapping[Row, float]
 ) -> dict[Row, float]:
     """Odd scales less those that physics explains."""
-    found = dict(odd)
+    suspicious = dict(odd)
     for row in odd:
         if row.kind == "force" and _is_wound_up(machine, recording):
             # A loop at its limit says that the force is not to be had; whose fault it is, is for
             # the diagnosis.
-            del found[row]
+            del suspicious[row]
     for unit in {row.unit for row in odd}:
         alike = [row for row in odd if row.unit == unit]
         if len(alike) == 2 and len([row for row in machine.rows if row.unit == unit]) > 2:
             one, other = (odd[row] for row in alike)
             if 0.5 < one / other < 2.0:
                 # Two sensors that agree on something that hardly moves: it hardly moves.
-                found = {row: slope for row, slope in found.items() if row not in alike}
-    return found
+                suspicious = {row: slope for row, slope in suspicious.items() if row not in alike}
+    return suspicious
 
 
 def _is_wound_up(machine: Machine, recording: Recording) -> bool:

@@ -80,7 +80,7 @@ class EffectFit:
     held_out_before, held_out_after : tuple of float
         The same of each held-out recording.
     warnings : tuple of str
-        What makes a value doubtful: bounds, flat directions, several optima.
+        Reasons to doubt a value: bounds, flat directions, several optima.
     machine : Machine
         The corrected machine.
     """
@@ -291,10 +291,10 @@ def _find_covariance(fitter: Fitter, fit: Fit) -> Array:
         values = [tuple(part.tolist()) for part in np.split(vector, cuts)]
         return evidence.residual(with_values(base, fit.effects, values))
 
-    here = np.concatenate([np.asarray(values, float) for values in fit.values])
-    rest = residual(here)
+    optimum = np.concatenate([np.asarray(values, float) for values in fit.values])
+    rest = residual(optimum)
     low, high = fitter.bounds(fit.effects)
-    jacobian = take_derivatives(residual, here, rest, steps, high)
+    jacobian = take_derivatives(residual, optimum, rest, steps, high)
     normal, _ = fitter.space.without_replaced(fit.effects).normal_equations(jacobian, rest)
     excess = max(fit.misfit / evidence.expected, 1.0)
     return _invert(normal, steps, high - low) * excess
@@ -369,10 +369,10 @@ def _find_doubts(
             )
     best = optima[0]
     flat_best = np.concatenate([np.asarray(values) for values in best.values])
-    for other in optima[1:]:
-        distance = np.abs(np.concatenate([np.asarray(v) for v in other.values]) - flat_best)
-        if other.misfit - best.misfit < TIED and np.any(distance > DISTINCT * deviations):
-            values = ", ".join(f"{v:.4g}" for values in other.values for v in values)
+    for rival in optima[1:]:
+        distance = np.abs(np.concatenate([np.asarray(v) for v in rival.values]) - flat_best)
+        if rival.misfit - best.misfit < TIED and np.any(distance > DISTINCT * deviations):
+            values = ", ".join(f"{v:.4g}" for values in rival.values for v in values)
             doubts.append(f"several optima: {values} explains the data as well")
             break
     return doubts

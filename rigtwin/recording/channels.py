@@ -78,15 +78,15 @@ def channels_of(
     list of Channel
         Channels with unit and meaning, empty where they are unknown.
     """
-    there = [(topic, name) for topic, names in columns.items() for name in names]
+    present = [(topic, name) for topic, names in columns.items() for name in names]
     rig = machine == DEFAULT_MACHINE and any(
-        topic == "/sensor" and name in Measurements._fields for topic, name in there
+        topic == "/sensor" and name in Measurements._fields for topic, name in present
     )
-    known = [c for c in CHANNELS if rig and (c.topic, c.name) in there]
+    known = [c for c in CHANNELS if rig and (c.topic, c.name) in present]
     named = {(channel.topic, channel.name) for channel in known}
     return known + [
         Channel(topic, name, (units or {}).get(f"{topic}.{name}", ""), "")
-        for topic, name in there
+        for topic, name in present
         if (topic, name) not in named
     ]
 

@@ -146,11 +146,11 @@ class GrowingRecording:
 
     def _find_chunk(self) -> bool:
         """Goes on at the next chunk behind damage; False if it has not been read yet."""
-        found = find_chunk(self._buffer, self._searched)
-        if found is None:
+        chunk = find_chunk(self._buffer, self._searched)
+        if chunk is None:
             self._at = self._searched = max(len(self._buffer) - CHUNK_HEAD, self._searched)
             return False
-        self._lost, self._at = False, found
+        self._lost, self._at = False, chunk
         return True
 
     def _skip_damage(self) -> bool:
@@ -158,12 +158,12 @@ class GrowingRecording:
         so that its length is damaged; reading then goes on at that chunk."""
         if self._lost or not self._begun:
             return False
-        found = find_chunk(self._buffer, max(self._searched, self._at + 1))
+        chunk = find_chunk(self._buffer, max(self._searched, self._at + 1))
         self._searched = max(len(self._buffer) - CHUNK_HEAD, self._at)
-        if found is None:
+        if chunk is None:
             return False
         self._content.add(Lost())
-        self._at = found
+        self._at = chunk
         return True
 
     def _add(self, record: bytes) -> bool:
