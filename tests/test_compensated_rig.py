@@ -184,6 +184,7 @@ def test_what_was_told_wrong_of_the_delay_is_found_in_the_commands(tmp_path):
     assert deviation.used == pytest.approx(0.004, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_a_corrected_twin_tells_the_controller(tmp_path):
     late = rigtwin.run(
         "suspension-rig",

@@ -48,6 +48,7 @@ def cart(folder: Path) -> rigtwin.Machine:
     return rigtwin.machine(folder / "cart.toml")
 
 
+@pytest.mark.slow
 def test_two_zeros_and_a_gain_that_scales_all_there_is():
     can = rigtwin.identifiability(rigtwin.machine("damper-bench"))
     assert can.confounded["offset@damper"] == ("offset@load_cell",)

@@ -37,6 +37,7 @@ def test_the_referee_imports_nothing_of_the_twin():
     assert not [name for name in loaded if name.partition(".")[0] in twin]
 
 
+@pytest.mark.slow
 def test_the_referees_rig_equals_the_nominal_twin_within_noise(tmp_path):
     for test in ("imposed", "road1.6"):
         law, demands = draw_demands(test, np.random.default_rng(4))
