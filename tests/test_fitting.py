@@ -68,9 +68,9 @@ def test_what_the_data_do_not_show_is_not_said_to_be_certain(recordings):
 @pytest.mark.parametrize(
     ("effects", "message"),
     [
-        (["coulomb@elbw"], "did you mean coulomb@elbow"),
+        (["coulomb@elbw"], "did you mean 'coulomb@elbow'"),
         ([], "no effect to fit"),
-        (["coulomb@elbow", "coulomb@elbow"], "sets a parameter that another"),
+        (["coulomb@elbow", "coulomb@elbow"], "sets a parameter that another effect"),
         (["backlash@elbow"], "lacks what it acts through"),
     ],
 )

@@ -18,7 +18,6 @@ from rigtwin.api.machines import (
     twin_of,
 )
 from rigtwin.api.recordings import resolve_recording
-from rigtwin.components import RigPlant
 from rigtwin.description.machine import Machine
 from rigtwin.diagnosis.change import Changes
 from rigtwin.diagnosis.changes import find_changes
@@ -33,7 +32,7 @@ from rigtwin.diagnosis.result import Diagnosis
 from rigtwin.errors import RigtwinError
 from rigtwin.recording import reader
 from rigtwin.simulation.experiment import find_experiment
-from rigtwin.studies.friction_spikes import Calibration, find_compensator
+from rigtwin.studies.friction_spikes import Calibration
 
 Recorded = reader.Recording | str | Path
 """A recording, or the path of one."""
@@ -111,16 +110,16 @@ def diagnose(
     >>> [str(effect.name) for effect in diagnosis.effects]  # doctest: +SKIP
     ['viscous@motor']
     """
-    inputs = read_inputs(recordings, machine, held_out, columns, test)
-    described = inputs.machine.excluding(names_of("exclude", exclude))
-    require_unrecorded(settings, described, [*inputs.recordings, *inputs.held_out])
+    data = read_data(recordings, machine, held_out, columns, test)
+    described = data.machine.excluding(names_of("exclude", exclude))
+    require_unrecorded(settings, described, [*data.recordings, *data.held_out])
     base = twin_of(described, settings, without)
     tests = [find_experiment(described, name) for name in described.next_tests]
     return find_reasons(
         described,
-        inputs.recordings,
+        data.recordings,
         base,
-        inputs.held_out,
+        data.held_out,
         tests,
         progress=progress,
         first_look=first_look,
@@ -128,7 +127,7 @@ def diagnose(
 
 
 @dataclass(frozen=True)
-class Inputs:
+class DiagnosisData:
     """Recordings of one machine.
 
     Attributes
@@ -146,13 +145,13 @@ class Inputs:
     held_out: tuple[reader.Recording, ...]
 
 
-def read_inputs(
+def read_data(
     recordings: Recorded | Sequence[Recorded],
     machine: Machine | str | Path | None,
     held_out: Recorded | Sequence[Recorded],
     columns: Mapping[str, str] | None,
     test: str,
-) -> Inputs:
+) -> DiagnosisData:
     """Read the recordings that `diagnose` and `fit` take.
 
     If the machine is a model, the recordings are logs: the first one describes the machine, and
@@ -181,7 +180,7 @@ def read_inputs(
         raise RigtwinError(
             "a recording is named twice; each counts once, and held-out data must not be fitted"
         )
-    return Inputs(described_machine(fitted[0], machine), tuple(fitted), tuple(judged))
+    return DiagnosisData(described_machine(fitted[0], machine), tuple(fitted), tuple(judged))
 
 
 def what_changed(
@@ -352,13 +351,9 @@ def calibrate(recording: Recorded) -> Calibration:
     """
     recording = resolve_recording(recording)
     machine = machine_of(recording)
-    if not isinstance(machine.plant, RigPlant):
-        raise RigtwinError(
-            f"{recording.path}: it is of machine {machine.name!r}; expected a suspension rig"
-        )
     configuration = machine.configuration_of(recording)
     require_fit(machine, recording, configuration)
-    calibration = find_compensator(recording, configuration.controller)
+    calibration = machine.physics.find_compensator(recording, configuration)
     if (
         calibration.detected < LEAST_DETECTED * calibration.reversals
         or calibration.false > MOST_FALSE * calibration.reversals

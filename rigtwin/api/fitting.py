@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from rigtwin.api.answers import Recorded, read_inputs
+from rigtwin.api.answers import Recorded, read_data
 from rigtwin.api.machines import Settings, twin_of
 from rigtwin.description.machine import Machine
 from rigtwin.diagnosis.data_checks import require_fit
@@ -71,19 +71,19 @@ def fit(
     >>> fitted["coulomb@elbow"].value  # doctest: +SKIP
     0.6001
     """
-    inputs = read_inputs(recordings, machine, held_out, columns, test)
+    data = read_data(recordings, machine, held_out, columns, test)
     names = [effects] if isinstance(effects, str) else list(effects)
     if not all(isinstance(name, str) for name in names):
         raise RigtwinError(f"effects {effects!r:.60}: expected names such as 'coulomb@rail'")
-    chosen = find_effects(inputs.machine, names)
-    base = twin_of(inputs.machine, settings)
+    chosen = find_effects(data.machine, names)
+    base = twin_of(data.machine, settings)
 
     def gather(tests: Sequence[reader.Recording]) -> Evidence | None:
-        configurations = [inputs.machine.configuration_of(test, base) for test in tests]
+        configurations = [data.machine.configuration_of(test, base) for test in tests]
         for recording, configuration in zip(tests, configurations, strict=True):
-            require_fit(inputs.machine, recording, configuration)
-        return Evidence(inputs.machine, tests, configurations) if tests else None
+            require_fit(data.machine, recording, configuration)
+        return Evidence(data.machine, tests, configurations) if tests else None
 
-    evidence = gather(inputs.recordings)
+    evidence = gather(data.recordings)
     assert evidence is not None
-    return fit_effects(evidence, chosen, gather(inputs.held_out), progress)
+    return fit_effects(evidence, chosen, gather(data.held_out), progress)

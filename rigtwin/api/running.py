@@ -14,6 +14,7 @@ from rigtwin.api.recordings import Recording, with_machine
 from rigtwin.description.changes import with_changes
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Machine
+from rigtwin.description.physics import TwinTest
 from rigtwin.errors import RigtwinError
 from rigtwin.files import forbid_overwriting, recordable
 from rigtwin.recording import reader
@@ -101,18 +102,16 @@ def run(
     _check_onset(effects_from, bool(effects), described, configuration)
 
     def record(target: Path) -> None:
-        described.physics.record(
-            target,
-            described,
-            test.name,
-            configuration,
-            test.demands(configuration, seed),
-            seed,
+        on_twin = TwinTest(
+            experiment=test.name,
+            configuration=configuration,
+            demands=test.demands(configuration, seed),
+            seed=seed,
             effects=effect_texts(effects),
             effects_from=effects_from,
             controller=getattr(controller, "tick", controller),
-            progress=progress,
         )
+        described.physics.record(target, described, on_twin, progress)
 
     if path is not None:
         record(recordable(forbid_overwriting(path, *described.files)))

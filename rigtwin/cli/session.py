@@ -48,7 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def execute(parsed: argparse.Namespace) -> int:
     """Runs the list and tells of each test what the twin says of it."""
     machine = rigtwin.machine(parsed.machine)
-    if machine.name != DEFAULT_MACHINE and not _needs_card(parsed):
+    if machine.physics.card is None and not _needs_card(parsed):
         return _run_on_twin(parsed, machine)
     from rigtwin.hardware.session.permission import require_permission
 
@@ -66,7 +66,7 @@ def execute(parsed: argparse.Namespace) -> int:
         nonlocal code
         code = run_supervised(_command_line(parsed, test), test.experiment, path)
         if code == 0:
-            _compare(path, parsed.machine if machine.name != DEFAULT_MACHINE else None)
+            _compare(path, parsed.machine)
         return code == 0
 
     rigtwin.run_session(

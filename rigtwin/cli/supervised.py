@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import rigtwin
-from machines import DEFAULT_MACHINE
 from rigtwin.cli.options import settings_of
 from rigtwin.console import late, table
 from rigtwin.errors import RigtwinError
@@ -72,7 +71,7 @@ def require_card(parsed: argparse.Namespace, machine: Machine) -> None:
         raise RigtwinError("--dry-run, --without-dry-run and --arm go with --target daq")
     if parsed.card is None and parsed.target == "daq":
         raise RigtwinError("--target daq needs the card's channel table: --card CARD.toml")
-    if parsed.card is None and parsed.real_time and machine.name != DEFAULT_MACHINE:
+    if parsed.card is None and parsed.real_time and machine.physics.card is None:
         raise RigtwinError(
             f"--real-time of {machine.name} needs a channel table of it: --card CARD.toml"
         )

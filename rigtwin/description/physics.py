@@ -9,12 +9,14 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from rigtwin.description.configuration import Configuration
+from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Inputs, Recording
 
@@ -35,11 +37,43 @@ if TYPE_CHECKING:
     from rigtwin.simulation.energy import EnergyError
     from rigtwin.simulation.experiment import Experiment
     from rigtwin.simulation.runner import RunResult
+    from rigtwin.studies.friction_spikes import Calibration
     from rigtwin.studies.tuning.measures import Measure
     from rigtwin.studies.tuning.run import Run
 
 Columns = Mapping[str, Mapping[str, Array]]
 """Topic → field → values, shape (ticks,)."""
+
+
+@dataclass(frozen=True)
+class TwinTest:
+    """A test to be run on a twin.
+
+    Attributes
+    ----------
+    experiment : str
+        Name of the test.
+    configuration : Configuration
+        Settings that the operator knows.
+    demands
+        Demanded signals, see `Experiment`.
+    seed : int
+        Seed of the sensor noise.
+    effects : sequence of str
+        Hidden effects: simulated, but not stored in the recording's settings.
+    effects_from : float
+        Time from which the effects act, s.
+    controller
+        Function of measurements and demands that replaces the machine's controller.
+    """
+
+    experiment: str
+    configuration: Configuration
+    demands: Any
+    seed: int
+    effects: Sequence[str] = ()
+    effects_from: float = 0.0
+    controller: Any = None
 
 
 class Physics(ABC):
@@ -144,14 +178,7 @@ class Physics(ABC):
         self,
         path: Path,
         machine: Machine,
-        experiment: str,
-        configuration: Configuration,
-        demands: Any,
-        seed: int,
-        *,
-        effects: Sequence[str] = (),
-        effects_from: float = 0.0,
-        controller: Any = None,
+        test: TwinTest,
         progress: Callable[[int], object] = lambda _ticks: None,
     ) -> RunResult:
         """Run a test on the twin and record it.
@@ -162,20 +189,8 @@ class Physics(ABC):
             File to write.
         machine
             Machine to simulate.
-        experiment
-            Name of the test.
-        configuration
-            Settings that the operator knows.
-        demands
-            Demanded signals, see `Experiment`.
-        seed
-            Seed of the sensor noise.
-        effects
-            Hidden effects: simulated, but not stored in the recording's settings.
-        effects_from
-            Time from which the effects act, s.
-        controller
-            Replaces the machine's controller.
+        test
+            What is run.
         progress
             Called with the ticks done since its last call.
         """
@@ -237,6 +252,19 @@ class Physics(ABC):
     def advise_controller(self, described: Plant, corrected: Plant) -> dict[str, Any]:
         """Return controller settings that the corrected plant asks for."""
         return {}
+
+    def find_compensator(self, recording: Recording, configuration: Configuration) -> Calibration:
+        """Return the settings of a friction compensator that a recording asks for.
+
+        Raises
+        ------
+        RigtwinError
+            If such a machine has no friction compensator.
+        """
+        raise RigtwinError(
+            f"{recording.path}: it is of machine {recording.machine!r}; {self.title} has no "
+            "friction compensator to calibrate"
+        )
 
     # Card and sessions: how a machine of this kind is connected and led through a test.
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -10,11 +9,12 @@ from pathlib import Path
 import numpy as np
 
 from rigtwin.components import Effect
+from rigtwin.components.library import find
 from rigtwin.components.plant import Plant
 from rigtwin.description.machine import Machine
 from rigtwin.description.mjcf import Change, write_mjcf
 from rigtwin.diagnosis.evidence import Evidence, relative_errors
-from rigtwin.diagnosis.fit import Fit, clashes, is_possible, with_values
+from rigtwin.diagnosis.fit import Fit, Values, clashes, is_possible, with_values
 from rigtwin.diagnosis.fitter import Fitter
 from rigtwin.diagnosis.gauss_newton import take_derivatives
 from rigtwin.diagnosis.overlay import Overlay, overlay
@@ -71,8 +71,12 @@ class EffectFit:
 
     Attributes
     ----------
+    effects : tuple of Effect
+        Fitted effects.
+    values : tuple of tuple of float
+        Values of each effect, in the order of its parameters.
     parameters : tuple of FittedParameter
-        All fitted values.
+        The same values with names, intervals and units.
     covariance : Array
         Covariance of the values, shape (parameters, parameters).
     error_before, error_after : tuple of float
@@ -85,6 +89,8 @@ class EffectFit:
         The corrected machine.
     """
 
+    effects: tuple[Effect, ...]
+    values: Values
     parameters: tuple[FittedParameter, ...]
     covariance: Array = field(repr=False)
     error_before: tuple[float, ...]
@@ -145,20 +151,19 @@ def find_effects(machine: Machine, names: Sequence[str]) -> tuple[Effect, ...]:
     Raises
     ------
     RigtwinError
-        For no name, an unknown one, or two that set the same parameter.
+        For an unknown name, one that the description excludes, or two that set one parameter.
     """
-    known = {effect.name: effect for effect in machine.effects()}
-    if not names:
-        raise RigtwinError(f"no effect to fit; {machine.name} can have {', '.join(known)}")
+    possible = set(machine.effects())
     chosen: list[Effect] = []
     for name in names:
-        if name not in known:
-            near = difflib.get_close_matches(name, known, 3, 0.5)
-            expected = f"did you mean {' or '.join(near)}?" if near else ", ".join(known)
-            raise RigtwinError(f"{machine.name} cannot have the effect {name!r}; {expected}")
-        if clashes(known[name], chosen):
-            raise RigtwinError(f"{name} sets a parameter that another of {', '.join(names)} sets")
-        chosen.append(known[name])
+        effect = find(name, machine.plant)
+        if effect not in possible:
+            raise RigtwinError(f"{machine.name}: the description excludes the effect {name}")
+        if clashes(effect, chosen):
+            raise RigtwinError(
+                f"{name} sets a parameter that another effect of {', '.join(names)} sets too"
+            )
+        chosen.append(effect)
     return tuple(chosen)
 
 
@@ -193,9 +198,12 @@ def fit_effects(
     Raises
     ------
     RigtwinError
-        If an effect cannot act on this machine together with the others.
+        For no effect, or one that cannot act on this machine together with the others.
     """
     effects = tuple(effects)
+    if not effects:
+        possible = ", ".join(effect.name for effect in evidence.machine.effects())
+        raise RigtwinError(f"no effect to fit; expected some of {possible}")
     if not is_possible(effects, evidence.plant):
         names = ", ".join(effect.name for effect in effects)
         raise RigtwinError(
@@ -214,6 +222,8 @@ def fit_effects(
     parameters = _list_parameters(evidence.machine, fit, covariance)
     plant = with_values(evidence.plant, effects, fit.values)
     return EffectFit(
+        effects=effects,
+        values=fit.values,
         parameters=parameters,
         covariance=covariance,
         error_before=_errors(evidence, evidence.plant),

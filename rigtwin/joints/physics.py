@@ -13,7 +13,7 @@ from rigtwin.components.plant import Plant, plant_of
 from rigtwin.description.configuration import Configuration, flatten
 from rigtwin.description.machine import Machine, ReplayOf
 from rigtwin.description.overlooked import overlooked
-from rigtwin.description.physics import Columns, Physics
+from rigtwin.description.physics import Columns, Physics, TwinTest
 from rigtwin.description.settings import Nothing
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Inputs, Recording
@@ -84,14 +84,7 @@ class IndependentJoints(Physics):
         self,
         path: Path,
         machine: Machine,
-        experiment: str,
-        configuration: Configuration,
-        demands: Any,
-        seed: int,
-        *,
-        effects: Sequence[str] = (),
-        effects_from: float = 0.0,
-        controller: Any = None,
+        test: TwinTest,
         progress: Callable[[int], object] = lambda _ticks: None,
     ) -> RunResult:
         from rigtwin.models.machine_twin import run_machine
@@ -99,12 +92,12 @@ class IndependentJoints(Physics):
         return run_machine(
             path,
             machine,
-            experiment,
-            configuration,
-            demands,
-            seed,
-            effects=effects,
-            controller=controller,
+            test.experiment,
+            test.configuration,
+            test.demands,
+            test.seed,
+            effects=test.effects,
+            controller=test.controller,
         )
 
     def simulate(

@@ -14,8 +14,9 @@ from rigtwin.description.machine import Machine
 from rigtwin.diagnosis import calibrated
 from rigtwin.diagnosis.data_checks import require_fit
 from rigtwin.diagnosis.evidence import Evidence
-from rigtwin.diagnosis.fit import Fit, clashes, with_values
+from rigtwin.diagnosis.fit import clashes, with_values
 from rigtwin.diagnosis.fitter import Fitter
+from rigtwin.diagnosis.known_effects import EffectFit, find_effects, fit_effects
 from rigtwin.errors import RigtwinError
 from rigtwin.files import atomic_write, forbid_overwriting
 from rigtwin.looking.motions import find_positions, predicts_motion
@@ -149,18 +150,6 @@ class Look:
             raise RigtwinError(f"unknown effect {name!r}; expected {', '.join(self.effects)}")
         return self.effects[name]
 
-    def _compatible(self, names: Sequence[str]) -> tuple[Effect, ...]:
-        """Return the effects. Raise RigtwinError if two of them set the same parameter."""
-        effects: list[Effect] = []
-        for name in names:
-            effect = self._find(name)
-            if clashes(effect, effects):
-                raise RigtwinError(
-                    f"{name} sets a parameter that another effect of {', '.join(names)} sets too"
-                )
-            effects.append(effect)
-        return tuple(effects)
-
     def plant(self, values: Mapping[str, Sequence[float]]) -> Plant:
         """Return the twin's plant with effects.
 
@@ -180,7 +169,7 @@ class Look:
             If an effect is unknown, two effects set the same parameter, or values are too many,
             too few or out of bounds.
         """
-        effects = self._compatible(tuple(values))
+        effects = find_effects(self.machine, tuple(values))
         for effect, numbers in zip(effects, values.values(), strict=True):
             _check(effect, numbers)
         return with_values(self._evidence.plant, effects, list(values.values()))
@@ -207,8 +196,8 @@ class Look:
         signals = self._evidence.predict(self.plant(values))[0]
         return judge(self.sensors, self._evidence.lines[0], signals)
 
-    def fit(self, names: Sequence[str]) -> Fit:
-        """Fit the values of effects to the recording, as a diagnosis does.
+    def fit(self, names: Sequence[str]) -> EffectFit:
+        """Fit the values of effects to the recording, as `rigtwin.fit` does.
 
         Parameters
         ----------
@@ -217,23 +206,15 @@ class Look:
 
         Returns
         -------
-        Fit
-            Effects, values and standard deviations.
+        EffectFit
+            Values, intervals, and reasons to doubt them.
 
         Raises
         ------
         RigtwinError
             If no effect is named, one is unknown, or two set the same parameter.
         """
-        effects = self._compatible(names)
-        if not effects:
-            raise RigtwinError(f"no effect to fit; expected some of {', '.join(self.effects)}")
-        # Fits of single effects are the start of the joint fit, which is only a local search.
-        alone = [self._fitter.fit_one(self._fitter.screen(effect)) for effect in effects]
-        start = [fit.values[0] for fit in alone]
-        together = alone[0] if len(alone) == 1 else self._fitter.refine(effects, start)
-        # Tolerances of other components widen the standard deviations.
-        return self._fitter.refit_with_tolerances(together)
+        return fit_effects(self._evidence, find_effects(self.machine, names))
 
     def save(self, path: str | Path, values: Mapping[str, Sequence[float]]) -> Path:
         """Write the twin with effects as TOML, for `--config`.

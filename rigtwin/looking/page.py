@@ -227,7 +227,7 @@ class Page:
                 for effect, value in zip(fitted.effects, fitted.values, strict=True)
             }
         )
-        self._status.content = describe_fit(fitted, self._look, time.monotonic() - begun)
+        self._status.content = describe_fit(fitted, time.monotonic() - begun)
 
     def _reset(self) -> None:
         """Take all effects out of the twin."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from html import escape
 
-from rigtwin.diagnosis.fit import Fit
+from rigtwin.diagnosis.known_effects import EffectFit
 from rigtwin.looking.look import Look
 from rigtwin.looking.prediction import Prediction
 from rigtwin.looking.starting_point import StartingPoint
@@ -51,16 +51,14 @@ def describe_starting_point(start: StartingPoint) -> str:
     return "".join(note(line) for line in lines)
 
 
-def describe_fit(fitted: Fit, look: Look, seconds: float) -> str:
-    """Return fitted values with their standard deviations."""
-    lines = [f"fitted in {seconds:.1f} s; plus or minus one standard deviation:"]
-    for effect, values, widths in zip(fitted.effects, fitted.values, fitted.widths, strict=True):
-        sliders = look.sliders[effect.name]
-        lines += [
-            f"{effect.name}: {slider.parameter} = {value:.5g} ± {width:.2g} {slider.unit}"
-            for slider, value, width in zip(sliders, values, widths, strict=True)
-        ]
-    return "".join(note(line) for line in lines)
+def describe_fit(fitted: EffectFit, seconds: float) -> str:
+    """Return fitted values with their intervals, and reasons to doubt them."""
+    lines = [f"fitted in {seconds:.1f} s; 95 % intervals if no other effect acts:"]
+    lines += [
+        f"{p.name} = {p.value:.5g} {p.unit} ({p.low:.4g} to {p.high:.4g})"
+        for p in fitted.parameters
+    ]
+    return "".join(note(line) for line in (*lines, *fitted.warnings))
 
 
 def describe_watch(watch: Watch) -> str:

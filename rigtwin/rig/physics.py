@@ -11,7 +11,7 @@ from rigtwin.components.gas_spring import GasSpring
 from rigtwin.components.plant import Plant
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import OWN, Machine, ReplayOf
-from rigtwin.description.physics import Columns, Physics
+from rigtwin.description.physics import Columns, Physics, TwinTest
 from rigtwin.description.settings import Nothing
 from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from rigtwin.simulation.energy import EnergyError
     from rigtwin.simulation.experiment import Experiment
     from rigtwin.simulation.runner import RunResult
+    from rigtwin.studies.friction_spikes import Calibration
     from rigtwin.studies.tuning.measures import Measure
     from rigtwin.studies.tuning.run import Run
 
@@ -90,14 +91,7 @@ class SuspensionRig(Physics):
         self,
         path: Path,
         machine: Machine,
-        experiment: str,
-        configuration: Configuration,
-        demands: Any,
-        seed: int,
-        *,
-        effects: Sequence[str] = (),
-        effects_from: float = 0.0,
-        controller: Any = None,
+        test: TwinTest,
         progress: Callable[[int], object] = lambda _ticks: None,
     ) -> RunResult:
         from rigtwin.description.catalogue import own_description
@@ -105,15 +99,15 @@ class SuspensionRig(Physics):
 
         return record(
             path,
-            experiment,
-            configuration,
-            demands,
-            seed,
+            test.experiment,
+            test.configuration,
+            test.demands,
+            test.seed,
             progress=progress,
-            effects=effects,
-            effects_from=effects_from,
+            effects=test.effects,
+            effects_from=test.effects_from,
             machine=machine.name,
-            controller=controller,
+            controller=test.controller,
             description=own_description(machine),
         )
 
@@ -168,6 +162,11 @@ class SuspensionRig(Physics):
             for plant in (described, corrected)
         )
         return {name: value for name, value in after.items() if value != before[name]}
+
+    def find_compensator(self, recording: Recording, configuration: Configuration) -> Calibration:
+        from rigtwin.studies.friction_spikes import find_compensator
+
+        return find_compensator(recording, configuration.controller)
 
     def signals(self, machine: Machine) -> Signals:
         from rigtwin.hardware.daq.signals import RIG

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 
 from rigtwin import __version__
 from rigtwin.description.configuration import Configuration
+from rigtwin.description.physics import TwinTest
 from rigtwin.errors import RigtwinError
 from rigtwin.render.plot import save
 from rigtwin.studies.tuning import text
@@ -93,7 +94,8 @@ def _record(path: Path, result: TuningResult, twin: Configuration) -> None:
     configuration = twin._replace(controller=result.settings)
     # Seed APART is the first held-out road, which no run of the search has used.
     demands = experiment.demands(configuration, APART)
-    machine.physics.record(path, machine, experiment.name, configuration, demands, APART)
+    test = TwinTest(experiment.name, configuration, demands, APART)
+    machine.physics.record(path, machine, test)
 
 
 def _csv(rows: list[list[object]]) -> str:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from machines import DEFAULT_MACHINE
 from rigtwin.console import table
+from rigtwin.description.catalogue import own_description
 from rigtwin.description.configuration import parameters
 from rigtwin.studies.tuning.evaluation import MeasureChange, SettingsComparison, Spread
 from rigtwin.studies.tuning.result import TUNED_NOMINAL, TuningResult, settings_of
@@ -202,9 +202,8 @@ def text(result: TuningResult) -> str:
 
 def command(study: Study, settings: object) -> str:
     """Return the command line that runs a study's experiment with settings from a file."""
-    shipped = study.machine.name == DEFAULT_MACHINE
-    machine = "" if shipped else f" --machine {study.machine.path}"
-    return f"rigtwin run {study.experiment.name}{machine} --config {settings}"
+    machine = own_description(study.machine) or study.machine.name
+    return f"rigtwin run {study.experiment.name} --machine {machine} --config {settings}"
 
 
 def toml(result: TuningResult, point: int | None = None) -> str:
