@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -63,6 +64,19 @@ def test_what_the_data_do_not_show_is_not_said_to_be_certain(recordings):
     wide = [p for p in some.parameters if "payload_" in p.name]
     assert wide
     assert all(p.high - p.low > 0.01 for p in wide)
+
+
+def test_a_copy_is_no_held_out_recording(recordings):
+    copy = replace(recordings[0], path=Path("copy.mcap"))
+    with pytest.raises(rigtwin.RigtwinError, match="same data"):
+        rigtwin.fit(recordings[0], ["coulomb@elbow"], held_out=copy)
+
+
+def test_a_copy_counts_once(recordings):
+    copy = replace(recordings[0], path=Path("copy.mcap"))
+    once, twice = (rigtwin.fit(r, list(HIDDEN)) for r in (recordings[0], [recordings[0], copy]))
+    assert twice.parameters == once.parameters
+    assert "copy.mcap" in twice.warnings[0]
 
 
 @pytest.mark.parametrize(

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from rigtwin.api.answers import Recorded, read_data
 from rigtwin.api.machines import Settings, twin_of
 from rigtwin.description.machine import Machine
+from rigtwin.diagnosis.copies import drop_copies, refuse_copies
 from rigtwin.diagnosis.data_checks import require_fit
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.known_effects import EffectFit as EffectFit
 from rigtwin.diagnosis.known_effects import find_effects, fit_effects
+from rigtwin.diagnosis.short_recordings import drop_short, least_ticks
 from rigtwin.errors import RigtwinError
 from rigtwin.recording import reader
 
@@ -78,12 +81,16 @@ def fit(
     chosen = find_effects(data.machine, names)
     base = twin_of(data.machine, settings)
 
-    def gather(tests: Sequence[reader.Recording]) -> Evidence | None:
+    recordings_kept, copies = drop_copies(data.recordings)
+    refuse_copies(data.held_out, recordings_kept)
+    fitted, short = drop_short(recordings_kept)
+    judged, short_held_out = drop_short(data.held_out)
+
+    def gather(tests: Sequence[reader.Recording]) -> Evidence:
         configurations = [data.machine.configuration_of(test, base) for test in tests]
         for recording, configuration in zip(tests, configurations, strict=True):
-            require_fit(data.machine, recording, configuration)
-        return Evidence(data.machine, tests, configurations) if tests else None
+            require_fit(data.machine, recording, configuration, least_ticks(tests))
+        return Evidence(data.machine, tests, configurations)
 
-    evidence = gather(data.recordings)
-    assert evidence is not None
-    return fit_effects(evidence, chosen, gather(data.held_out), progress)
+    result = fit_effects(gather(fitted), chosen, gather(judged) if judged else None, progress)
+    return replace(result, warnings=(*copies, *short, *short_held_out, *result.warnings))

@@ -202,7 +202,9 @@ def load(path: str | Path, machine: Machine | str | Path | None = None) -> Recor
     """
     if not isinstance(path, str | Path):
         raise RigtwinError(f"{path!r:.60}: expected the path of a recording")
-    return with_machine(reader.load(Path(path)), _resolve_optional(machine))
+    # The machine first: a model or a folder in its place is the likelier mistake.
+    described = _resolve_optional(machine)
+    return with_machine(reader.load(Path(path)), described)
 
 
 def resolve_recording(recording: reader.Recording | str | Path) -> reader.Recording:

@@ -15,7 +15,7 @@ from rigtwin.cli.options import (
     read_recordings,
     settings_of,
 )
-from rigtwin.console import table, write_json
+from rigtwin.console import table, writable, write_json
 
 if TYPE_CHECKING:
     from rigtwin import EffectFit
@@ -68,6 +68,9 @@ def execute(parsed: argparse.Namespace) -> int:
 
     import rigtwin
 
+    for out in (parsed.json, parsed.save_mjcf):
+        if out is not None:
+            writable(out)
     recordings, held_out = read_recordings(parsed)
     with tqdm(disable=None, unit=" fits", desc="fitting", leave=False) as bar:
         fitted = rigtwin.fit(
