@@ -1,5 +1,4 @@
-"""Where the program begins: until the packages are imported Ctrl-C ends it in silence, as it ends a
-program that is not written in Python."""
+"""Start of the program: Ctrl-C ends it in silence until the packages are imported."""
 
 from __future__ import annotations
 

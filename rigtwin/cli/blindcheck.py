@@ -46,16 +46,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--machine",
         choices=("rig", "arm"),
         default="rig",
-        help="whose defects are withheld (default rig): arm is joints that act on each other",
+        help="machines with withheld defects (default rig); arm: joints that act on each other",
     )
     parser.add_argument(
-        "--seed", type=int, default=2026, help="of the referee's draws (default 2026)"
+        "--seed", type=int, default=2026, help="seed of the referee's draws (default 2026)"
     )
     parser.add_argument(
         "--folder",
         type=Path,
         default=Path("blindcheck"),
-        help="of recordings and answers; a second run goes on",
+        help="folder of recordings and answers; a second run continues",
     )
     parser.add_argument(
         "--baselines", action="store_true", help="also score what cruder methods would have said"

@@ -45,7 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         nargs="+",
         metavar="recording",
-        help="of one rig, explained together unless --each",
+        help="recordings of one machine, explained together unless --each",
     )
     add_json(parser, "the answer for other programs")
     parser.add_argument(
@@ -79,7 +79,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         default=[],
         metavar="recording",
-        help="of the same rig, to judge on",
+        help="recordings of the same machine to judge on",
     )
     parser.add_argument(
         "--save-twin", type=Path, metavar="F.toml", help="write the corrected twin, for --config"

@@ -31,8 +31,7 @@ def check_files(parsed: argparse.Namespace) -> None:
 
 
 def _machine_files(name: object) -> tuple[Path, ...]:
-    """What a machine is read from, so far as it can be read: who works with it says what is
-    wrong."""
+    """Return the files of a machine; none if it cannot be read, which its user reports."""
     if not isinstance(name, str):
         return ()
     from rigtwin.description import catalogue  # Late: MuJoCo takes a second.

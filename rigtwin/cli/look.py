@@ -42,7 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--save-twin",
         type=Path,
         metavar="F.toml",
-        help="what the save button writes (default: RECORDING_twin.toml in this folder)",
+        help="file that the save button writes (default: RECORDING_twin.toml in this folder)",
     )
     parser.add_argument(
         "--without",

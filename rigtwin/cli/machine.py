@@ -86,7 +86,7 @@ def execute(parsed: argparse.Namespace) -> int:
 
 
 def _print_never(machine: Machine, seconds: float) -> None:
-    """What can never be identified, before there are any data."""
+    """Print which effects the sensors can never identify."""
     with _telling() as progress:
         progress("packages")
         import rigtwin

@@ -32,7 +32,7 @@ def add_settings(parser: argparse.ArgumentParser) -> None:
 
 
 def settings_of(parsed: argparse.Namespace) -> list[Path | Mapping[str, Any]]:
-    """What --config and --set change, in that order."""
+    """Return the changes of --config and --set, in that order."""
     return [*([parsed.config] if parsed.config else []), *assigned_settings(parsed.set)]
 
 
@@ -62,7 +62,7 @@ def add_columns(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="KEY=SOURCE",
-        help="what a log does not state, e.g. elbow.position=q2, 'elbow.force=-tau2 [Nm]', "
+        help="statement about a column of a log, e.g. elbow.position=q2, 'elbow.force=-tau2 [Nm]', "
         "'*.position=[deg]', 'time=t [ms]', time=0.002",
     )
     parser.add_argument(
@@ -75,7 +75,7 @@ def add_columns(parser: argparse.ArgumentParser) -> None:
 
 
 def columns_of(parsed: argparse.Namespace) -> dict[str, str]:
-    """What --column states. Raises RigtwinError for a text without a source."""
+    """Return the statements of --column. Raise RigtwinError for a text without a source."""
     from rigtwin.errors import RigtwinError
 
     stated: dict[str, str] = {}

@@ -35,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--folder",
         type=Path,
         default=Path("reproduction"),
-        help="of the results (default reproduction)",
+        help="folder of the results (default reproduction)",
     )
     parser.add_argument(
         "--json", type=Path, metavar="F.json", help="also write everything for other programs"

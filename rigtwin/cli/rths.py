@@ -23,7 +23,9 @@ With --tune the compensator's gains, rates or weights are looked for on --plants
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--case", type=int, default=1, help="of the building, 1 to 4 (default 1)")
+    parser.add_argument(
+        "--case", type=int, default=1, help="case of the building, 1 to 4 (default 1)"
+    )
     parser.add_argument(
         "--quake", default="elcentro", help="elcentro, kobe or morgan (default elcentro)"
     )
@@ -41,10 +43,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--noise", action="store_true", help="with the noise of the benchmark's converters"
     )
-    parser.add_argument("--seed", type=int, default=1, help="of plants and noise (default 1)")
+    parser.add_argument("--seed", type=int, default=1, help="seed of plants and noise (default 1)")
     parser.add_argument("--tune", action="store_true", help="tune the compensator first")
     parser.add_argument(
-        "--evaluations", type=int, default=30, help="of the criterion, with --tune (default 30)"
+        "--evaluations",
+        type=int,
+        default=30,
+        help="evaluations of the criterion, with --tune (default 30)",
     )
     parser.add_argument(
         "--json", type=Path, metavar="F.json", help="also write the figures to a file"

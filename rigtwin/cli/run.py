@@ -32,7 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--seed",
         type=int,
         default=0,
-        help="of noise and road (default 0); the same seed gives the same bytes",
+        help="seed of noise and road (default 0); the same seed gives the same bytes",
     )
     parser.add_argument(
         "--out",

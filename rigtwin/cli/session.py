@@ -27,7 +27,10 @@ ends at the first test that does not complete; --resume goes on with what is mis
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("list", type=Path, metavar="LIST.toml", help="the tests")
     parser.add_argument(
-        "--folder", type=Path, default=Path("session"), help="of the recordings (default session)"
+        "--folder",
+        type=Path,
+        default=Path("session"),
+        help="folder of the recordings (default session)",
     )
     parser.add_argument(
         "--resume",

@@ -23,7 +23,10 @@ if TYPE_CHECKING:
 def add_supervised(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("on the rig (docs/rig.md)")
     group.add_argument(
-        "--target", choices=("twin", "daq"), default="twin", help="what to run on (default twin)"
+        "--target",
+        choices=("twin", "daq"),
+        default="twin",
+        help="run on the twin or on the card (default twin)",
     )
     group.add_argument(
         "--card",

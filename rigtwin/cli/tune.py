@@ -28,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--machine",
         metavar="F.toml",
-        help="whose controller, by name or description (default: the study's, or the rig's)",
+        help="machine whose controller is tuned, by name or description (default: the study's)",
     )
     parser.add_argument(
         "--twin",
@@ -37,13 +37,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="tune on this calibrated twin and within its uncertainty",
     )
     parser.add_argument(
-        "--out", "-o", type=Path, metavar="FOLDER", help="of the results (default tuning/STUDY)"
+        "--out",
+        "-o",
+        type=Path,
+        metavar="FOLDER",
+        help="folder of the results (default tuning/STUDY)",
     )
     parser.add_argument(
         "--seed",
         type=int,
         default=1,
-        help="of the optimiser (default 1); the same seed gives the same settings",
+        help="seed of the optimiser (default 1); the same seed gives the same settings",
     )
     parser.add_argument(
         "--evaluations",

@@ -20,7 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--camera",
-        help="of the model, or free; the rig has overview, side and wheel (default: first)",
+        help="camera of the model, or free; the rig has overview, side and wheel (default: first)",
     )
     parser.add_argument(
         "--magnify",

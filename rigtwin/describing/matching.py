@@ -1,4 +1,4 @@
-"""Which column of a log is which quantity of which joint, by the names of both."""
+"""Match the columns of a log with quantities of joints, by the names of both."""
 
 from __future__ import annotations
 

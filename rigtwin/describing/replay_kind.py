@@ -1,4 +1,4 @@
-"""Which kind of test a log is of, by the quantities that it holds and by the model's actuators."""
+"""Kind of test of a log, concluded from its quantities and the model's actuators."""
 
 from __future__ import annotations
 

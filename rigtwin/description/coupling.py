@@ -1,4 +1,4 @@
-"""Which joints of a mechanism act on each other, by inertia or by gravity."""
+"""Coupling of a mechanism's joints by inertia or gravity."""
 
 from __future__ import annotations
 

@@ -1,2 +1,2 @@
-"""Where the twin and a recording disagree: component replays, and what noise alone would leave of
+"""Disagreement of the twin and a recording: component replays, and what noise alone would leave of
 them."""

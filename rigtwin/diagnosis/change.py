@@ -64,7 +64,7 @@ class ComparedParameter:
 
 @dataclass(frozen=True)
 class Changes:
-    """What changed between recordings of one machine.
+    """Changes between recordings of one machine.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""Is a recording fit to be diagnosed? Faults of the data, before anybody takes them for physics."""
+"""Faults of recorded data, which a diagnosis would take for physics."""
 
 from __future__ import annotations
 
@@ -20,28 +20,27 @@ from rigtwin.signals.noise import rms, smallest_step, white_noise
 from rigtwin.signals.runs import find_cut_off, longest_run
 
 SHORTEST = 200
-"""Ticks below which a noise floor cannot be estimated: of a recording that is judged alone, or of
-all recordings that are judged together."""
+"""Ticks that a noise floor needs: of one recording, or of all recordings of a set together."""
 SHORTEST_PART = 40
-"""Ticks below which a recording does not count among others: filters need them to settle."""
+"""Ticks that each recording of a set needs, so that filters settle."""
 SHORTEST_TIME = 0.5
-"""s; less than a few periods of anything that a machine does says nothing."""
+"""Shortest recording, s: fewer than a few periods of a machine's motion cannot be judged."""
 STEPS = 2
-"""Of integration a tick, for a rough prediction."""
+"""Integration steps per tick of the rough prediction."""
 STUCK = 200
-"""Equal samples in a row of a sensor whose noise is declared: it is not alive."""
+"""Equal samples in a row from which a sensor with declared noise counts as dead."""
 COARSE = 20.0
-"""Times its declared bit from which a sensor is coarse."""
+"""Multiple of the declared resolution from which a sensor counts as coarse."""
 MOVES = 10.0
-"""A signal this many times its noise says what its scale is."""
+"""Ratio of signal to noise from which the scale of a signal is checked."""
 OUTLIER = 100.0
-"""Times the range of nearly all of a signal at which a sample is damage."""
+"""Multiple of a signal's usual range from which a sample counts as damaged."""
 PLAUSIBLE = 1e9
-"""In SI units; above it a number is damage."""
+"""Largest plausible value, in SI units."""
 WOUND_UP = 0.05
-"""Share of ticks with a command at its limit from which its loop is no measure of a force."""
+"""Share of ticks with a command at its limit from which the scale of its force is not checked."""
 MOST_SWAPPED = 4
-"""Sensors of one unit among which an exchange is looked for."""
+"""Most sensors of one unit whose exchange is tested: the permutations grow with the factorial."""
 UNITS: Mapping[str, tuple[tuple[float, str], ...]] = {
     "m": ((1e3, "mm"), (1e2, "cm"), (39.37, "inch"), (1e6, "um")),
     "rad": ((57.2958, "degrees"),),
@@ -49,22 +48,33 @@ UNITS: Mapping[str, tuple[tuple[float, str], ...]] = {
     "N": ((1e-3, "kN"), (0.2248, "lbf"), (9.81**-1, "kgf")),
     "Nm": ((1e3, "Nmm"),),
 }
-"""SI unit → (how many of another make one, its name)."""
+"""SI unit → factor and name of the units it is often confused with."""
 
 
 CORRELATED = 0.75
-"""Correlation of a signal with its prediction from which its sign and its unit are judged."""
+"""Correlation of a signal with its prediction from which its sign and unit are checked."""
 SAME_UNIT, NEAR_UNIT = 0.15, 0.5
-"""Differences of the logarithms of a scale and of a unit's factor: below the first the unit is
-wrong, below the second a scale that is implausible anyway is said to look like that unit."""
+"""Differences of log(scale) and log(unit factor). Below the first the unit is wrong. Below the
+second a scale that is implausible anyway is described as resembling that unit."""
 EXCHANGED = 0.5
-"""Share of the signals that their best order may leave for an exchange to be believed."""
+"""Share of the signals' power that their best order may leave unexplained."""
 
 
 @dataclass(frozen=True)
 class Fault:
-    """One thing wrong with the data. kind: short name; where: the channel, or the recording;
-    message: one line; fatal: no comparison makes sense."""
+    """One fault of the data.
+
+    Attributes
+    ----------
+    kind : str
+        Short name of the fault.
+    where : str
+        Channel, or the recording.
+    message : str
+        Description in one line.
+    fatal : bool
+        Whether the fault makes every comparison meaningless.
+    """
 
     kind: str
     where: str
@@ -120,8 +130,7 @@ def require_fit(
     configuration: Configuration,
     least: int = SHORTEST,
 ) -> tuple[Fault, ...]:
-    """The faults that do not forbid a comparison. Raises RigtwinError naming every one that
-    does."""
+    """Return the faults that allow a comparison. Raise RigtwinError that names all fatal ones."""
     faults = find_faults(machine, recording, configuration, least)
     if fatal := [fault.message for fault in faults if fault.fatal]:
         raise RigtwinError(f"{recording.path}: {'; '.join(fatal)}")
@@ -129,7 +138,7 @@ def require_fit(
 
 
 def channels(machine: Machine) -> list[tuple[str, str]]:
-    """(topic, field) of everything that a diagnosis of the machine reads, in order."""
+    """Return topic and field of every channel that a diagnosis of the machine reads."""
     required = []
     for replay in machine.replays:
         movers = [machine.components[name].channel for name in replay.moved_by]
@@ -241,12 +250,12 @@ def _check_alive(machine: Machine, recording: Recording, predicted: Array) -> It
 
 
 def _movers(machine: Machine) -> set[str]:
-    """What the recording moves a machine by."""
+    """Return the channels that move the machine."""
     return {name for replay in machine.replays if not replay.closed for name in replay.moved_by}
 
 
 def _is_at_rest(machine: Machine, row: Row, predicted: Array) -> bool:
-    """Whether a signal should not change: commands that stay put move nothing."""
+    """Return whether a signal should stand still, because no command changes."""
     bit = getattr(getattr(machine.plant, row.name, None), "resolution", 0.0)
     return float(np.ptp(predicted)) <= bit
 
@@ -273,7 +282,7 @@ def _check_inputs(
 
 
 def _check_order(machine: Machine, recording: Recording, predicted: Array) -> Iterator[Fault]:
-    """Swapped channels: another order of the sensors of one unit fits far better."""
+    """Yield exchanged channels: another order of the sensors of one unit fits far better."""
     for unit in dict.fromkeys(row.unit for row in machine.rows if row.kind != "command"):
         rows = [
             (n, row)
@@ -316,7 +325,7 @@ def _check_order(machine: Machine, recording: Recording, predicted: Array) -> It
 
 
 def _check_scale(machine: Machine, recording: Recording, predicted: Array) -> Iterator[Fault]:
-    """Signs and units, by how a signal goes with what the nominal machine would show."""
+    """Yield wrong signs and units, by comparing signals with the nominal prediction."""
     far = machine.prior.implausible_scale
     odd: dict[Row, float] = {}
     for row, model in zip(machine.rows, predicted, strict=True):
@@ -353,7 +362,7 @@ def _check_scale(machine: Machine, recording: Recording, predicted: Array) -> It
 def _unexplained_scales(
     machine: Machine, recording: Recording, odd: Mapping[Row, float]
 ) -> dict[Row, float]:
-    """Odd scales less those that physics explains."""
+    """Return the implausible scales that no physical cause explains."""
     suspicious = dict(odd)
     for row in odd:
         if row.kind == "force" and _is_wound_up(machine, recording):
@@ -371,7 +380,7 @@ def _unexplained_scales(
 
 
 def _is_wound_up(machine: Machine, recording: Recording) -> bool:
-    """Whether a force actuator's command stands at its limit for long."""
+    """Return whether a force actuator's command is at its limit for long."""
     for name in _movers(machine):
         component = machine.components[name]
         if component.channel is None or component.element != "actuator":
