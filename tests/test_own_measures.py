@@ -129,7 +129,7 @@ def test_a_drive_is_tuned_and_its_settings_run(tmp_path: Path, capsys) -> None:
     assert main(["tune", str(study), "--out", str(folder), "--workers", "2"]) == 0
     output = capsys.readouterr().out
     line = next(line for line in output.splitlines() if line.startswith("rigtwin run positioning"))
-    assert "emps.toml --config" in line
+    assert "--machine emps --config" in line
     before = rigtwin.run("emps", "positioning", settings=SETTINGS)
     tuned = rigtwin.run("emps", "positioning", settings=[SETTINGS, folder / "tuned.toml"])
     for recording in (load(folder / "best.mcap"), tuned):
