@@ -111,7 +111,7 @@ READ_OFF = {"hum", "noise", "quantisation"}
 @pytest.mark.parametrize("name", [name for name in shipped() if name != "suspension-rig"])
 def test_every_effect_of_a_machine_can_be_searched_for(name):
     machine = find(name)
-    scale = Scales(0.03, 0.1, 0.25, 0.8, 60.0, 1e-3)
+    scale = Scales(0.03, (-0.03, 0.03), 0.1, 0.25, 0.8, 60.0, 1e-3)
     swing = Swing((1.0,) * len(SHARES), (1.0,) * len(SHARES))
     for effect in machine.effects():
         if effect.kind.name in READ_OFF:

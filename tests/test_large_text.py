@@ -94,6 +94,7 @@ def test_only_the_needed_columns_are_read_and_all_are_listed(tmp_path: Path, mon
         assert found.names == ("a", "b", "c", "d")
 
 
+@pytest.mark.slow
 def test_memory_does_not_grow_with_the_columns_that_are_not_needed(tmp_path: Path, monkeypatch):
     monkeypatch.setattr(fast_text, "LARGE", 10**12)
     row = ",".join(["1.2345678"] * 60)

@@ -40,6 +40,7 @@ SIZES = {
     "drag": 8.0,
     "relaxation": 0.03,
     "cogging": 3.0,
+    "position_force": 3.0,
     "load_friction": 0.3,
     "mass": 3.0,
     "armature": 0.8,

@@ -76,7 +76,7 @@ def swing():
 
 def size_of(effect: Effect, swing: dict[str, Swing]) -> tuple[float, ...]:
     # The load at which a cylinder was set to zero is the only start here that depends on a motion.
-    scales = Scales(0.03, 0.05, 0.2, 1.0, force=230.0, period=1e-3)
+    scales = Scales(0.03, (-0.03, 0.03), 0.05, 0.2, 1.0, force=230.0, period=1e-3)
     starts = effect.starts(RIG.plant, swing.get(effect.component, Swing()), lambda: scales).values
     return starts[len(starts) // 2]
 

@@ -135,6 +135,7 @@ def test_the_size_of_a_defect_is_its_change_in_units_of_noise():
     assert MATERIAL == 1.0
 
 
+@pytest.mark.slow
 def test_the_key_is_committed_to_before_it_is_opened(tmp_path):
     command = [sys.executable, "-m", "referee.referee", str(tmp_path), "1", "3"]
     requests = "next 0 imposed-fast\nopen\n"

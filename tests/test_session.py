@@ -204,6 +204,7 @@ def test_mistakes_are_said_before_anything_moves(
     assert not list(tmp_path.glob("*.mcap"))
 
 
+@pytest.mark.slow
 def test_the_rig_is_armed_only_after_a_dry_run_of_just_that(card, capsys, tmp_path, monkeypatch):
     monkeypatch.setattr(permission, "open_card", lambda _: None)
     monkeypatch.chdir(tmp_path)
@@ -501,6 +502,7 @@ def patient() -> Test:
     return session("safety.missed=5000", "timing.duration=2.5")
 
 
+@pytest.mark.slow
 def test_a_session_in_real_time_is_kept_by_the_guardian(tmp_path):
     test = patient()
     twin = InRealTime(WiredTwin(test.terminals(), TABLE), 1e-3)

@@ -252,20 +252,6 @@ def test_a_stop_that_nothing_predicts_is_said(tmp_path: Path):
 
 
 @pytest.mark.slow
-@MISSED
-def test_friction_as_mujoco_has_it_is_friction(tmp_path: Path):
-    """MuJoCo's dry friction creeps where it should stick, by 1 mm/s for every m/s² here, so that
-    something is left of whatever sticks."""
-    name = "cartpole"
-    record = imported(name, tmp_path, log(name, tmp_path, rub("slider", 0.8)))
-    answer = rigtwin.diagnose(record, machine=described(name, tmp_path))
-    (found,) = answer.effects
-    assert answer.verdict == "partly explained"
-    assert str(found.name) == "coulomb@rail"
-    assert found.parameters["coulomb"].value == pytest.approx(0.8, rel=0.1)
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize(("name", "change", "late", "effects"), HIDDEN)
 def test_what_is_changed_in_a_strangers_model_is_found(
     tmp_path: Path,

@@ -118,6 +118,7 @@ def served(**options: object) -> Iterator[tuple[SlowModel, GenericClientServer]]
         server.close()
 
 
+@pytest.mark.slow
 def test_a_body_in_another_program_drops_as_it_should(own: rigtwin.Recording) -> None:
     """In lock step, as on a twin: nothing is late."""
     with served(waits=True, latest=5.0) as (model, server):

@@ -291,6 +291,7 @@ def joined(address: str):
         time.sleep(0.2)
 
 
+@pytest.mark.slow
 def test_a_cluster_gives_the_same_answers_and_may_lose_a_worker(cluster, tmp_path):
     address, processes = cluster
     with joined(address) as workers, Store(tmp_path / "s.sqlite") as store:

@@ -99,6 +99,7 @@ print(rigtwin.diagnose(sys.argv[1]).verdict)
 """
 
 
+@pytest.mark.slow
 def test_everything_imports_and_a_diagnosis_runs_without_posix(tmp_path: Path) -> None:
     done = subprocess.run(
         [sys.executable, "-c", ON_WINDOWS, str(tmp_path / "run.mcap")],

@@ -570,6 +570,7 @@ def tune(folder: Path, *options: str, text: str = SMALL) -> int:
     return main(["tune", str(small(folder, text)), *out, *options])
 
 
+@pytest.mark.slow
 def test_a_study_from_end_to_end(tmp_path, capsys):
     path, out = small(tmp_path), tmp_path / "out"
     assert main(["tune", str(path), "--out", str(out), "--workers", "1"]) == 0

@@ -18,6 +18,8 @@ from rigtwin.numerics.arrays import Array
 SHARES = (0.9999, 0.999, 0.98, 0.9, 0.75, 0.5, 0.3)
 """Quantiles of a command's magnitude and rate at which a search for a limit starts."""
 TINY = 1e-12
+Points = tuple[tuple[float, float], ...]
+"""Positions and forces of a curve, m and N."""
 NAMES = {"computer": "controller"}
 """Component of the plant → its name in effects, where they differ."""
 GROUPS = {component: group for group, component in NAMES.items()}
@@ -63,6 +65,8 @@ class Scales:
     ----------
     stroke : float
         Half the range of positions, m.
+    span : tuple of float
+        Lowest and highest position, m; as measured, where the position is.
     speed, acceleration, force : float
         rms values, m/s, m/s² and N.
     fastest : float
@@ -72,6 +76,7 @@ class Scales:
     """
 
     stroke: float
+    span: tuple[float, float]
     speed: float
     fastest: float
     acceleration: float
@@ -84,7 +89,9 @@ class Scales:
         return max(self.stroke / self.speed, self.period)
 
     @classmethod
-    def of(cls, motion: Motion, force: float, period: float) -> Scales:
+    def of(
+        cls, motion: Motion, force: float, period: float, measured: Array | None = None
+    ) -> Scales:
         """Return the scales of a motion.
 
         Parameters
@@ -95,10 +102,14 @@ class Scales:
             rms of the force measured there, N.
         period
             Time from tick to tick, s.
+        measured
+            Measured position, m, shape (ticks,), where there is any.
         """
+        positions = motion.position if measured is None else measured
         rms = float(np.sqrt(np.mean(motion.force**2)))
         return cls(
             stroke=max(0.5 * float(np.ptp(motion.position)), TINY),
+            span=(float(np.min(positions)), float(np.max(positions))),
             speed=max(float(np.sqrt(np.mean(motion.speed**2))), TINY),
             fastest=max(float(np.max(np.abs(motion.speed))), TINY),
             acceleration=max(float(np.std(np.gradient(motion.speed, period))), TINY),
@@ -120,6 +131,8 @@ class Starts:
     quadrature : bool
         Whether starts come in pairs a quarter of a wave apart, (amplitude, pitch, 0) and
         (amplitude, pitch, π/2). A linear combination of both gives any phase.
+    is_linear : bool
+        Whether the response to the sum of all starts is the sum of their responses.
     bounds : tuple of pairs or None
         Bounds of the parameters by what the recording can show; None for the parameters' own.
     """
@@ -127,6 +140,7 @@ class Starts:
     values: tuple[tuple[float, ...], ...]
     steps: tuple[float, ...]
     quadrature: bool = False
+    is_linear: bool = False
     bounds: tuple[tuple[float, float], ...] | None = None
 
     @classmethod
@@ -193,6 +207,13 @@ class Kind:
     nuisances : tuple of str
         Parameters that are fitted with the effect but do not describe it, such as the load at which
         a zero was set.
+    magnitudes : int
+        Number of leading parameters that are magnitudes: 1, or the number of coefficients of a
+        force that is linear in all of them.
+    constants : tuple of str
+        Parameters that a start sets and no fit changes, such as the range of a curve.
+    points : callable or None
+        Function that returns positions and forces of a curve, m and N, from its parameters.
     """
 
     name: str
@@ -202,6 +223,18 @@ class Kind:
     at: Mapping[type, Guess | None] = field(compare=False, repr=False)
     negative: str = field(default="", compare=False, repr=False)
     nuisances: tuple[str, ...] = field(default=(), compare=False, repr=False)
+    magnitudes: int = field(default=1, compare=False, repr=False)
+    constants: tuple[str, ...] = field(default=(), compare=False, repr=False)
+    points: Callable[[Mapping[str, float]], Points] | None = field(
+        default=None, compare=False, repr=False
+    )
+
+    @property
+    def fitted(self) -> tuple[str, ...]:
+        """Parameters that a fit changes and that describe the effect."""
+        return tuple(
+            name for name in self.parameters if name not in (*self.nuisances, *self.constants)
+        )
 
     def __reduce__(self) -> tuple[Callable[[str, list[str]], Kind], tuple[str, list[str]]]:
         """Kinds are code, which stays where it is: another process looks one up by its name and the
@@ -262,6 +295,38 @@ class Effect:
         """Return the values of the effect's parameters in a plant, by name."""
         component = getattr(plant, self.group)
         return {name: float(getattr(component, name)) for name in self.kind.parameters}
+
+    def distances(self, values: Sequence[float], plant: Plant) -> tuple[float, ...]:
+        """Return the distances of an effect's magnitudes from their nominal values.
+
+        Parameters
+        ----------
+        values
+            Values of the effect's parameters.
+        plant
+            Plant without the effect.
+        """
+        nominal = self.nominal(plant)
+        names = self.kind.parameters[: self.kind.magnitudes]
+        return tuple(abs(value - nominal[name]) for name, value in zip(names, values, strict=False))
+
+    def steadiness(self, values: Sequence[float], widths: Sequence[float], plant: Plant) -> float:
+        """Return the distance of an effect from its nominal value in standard errors.
+
+        Of several magnitudes the one counts that is furthest from its nominal value.
+
+        Parameters
+        ----------
+        values, widths
+            Values of the effect's parameters, and their standard errors.
+        plant
+            Plant without the effect.
+        """
+        distances = self.distances(values, plant)
+        return max(
+            distance / max(width, 1e-300)
+            for distance, width in zip(distances, widths, strict=False)
+        )
 
     def starts(self, plant: Plant, swing: Swing, scales_of: Callable[[], Scales]) -> Starts:
         """Return the starts of a search for the effect.

@@ -8,7 +8,7 @@ Automatica 30(7), 1994). `docs/theory.md` derives the equations.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import product
 from typing import Annotated, NamedTuple
 
@@ -18,6 +18,7 @@ from controllers.compiled import compilable
 from rigtwin.components.effect import (
     Context,
     Kind,
+    Points,
     Scales,
     Starts,
     around_nominal,
@@ -38,6 +39,16 @@ ONE_WAY = 0.05
 and rubs the other way."""
 SLOWEST, SLOW = 0.01, 0.35
 """Bounds of the Stribeck velocity, as shares of the highest speed."""
+CURVE = ("curve_2", "curve_3", "curve_4", "curve_5")
+"""Coefficients of the curve of a position-dependent force."""
+FRAME = ("curve_middle", "curve_half_range")
+"""Range of positions to which the coefficients refer."""
+TOLD = 7
+"""Number of positions at which a curve is told."""
+SHORTEST = 1e-9
+"""Shortest half range of a curve, m."""
+NEARLY = 0.1
+"""Share of the half range by which the middle of a range that counts as symmetric may be off."""
 WAVES = 3.0
 """Smallest number of cogging waves along the stroke. Fewer are a force that depends on position."""
 
@@ -72,12 +83,16 @@ class Guide(NamedTuple):
         F_viscous    = (viscous ± ½·viscous_asymmetry)·v, through a first-order lag `relaxation`
         F_position   = stiffness·(x − x_rest) + offset
                        + cogging·sin(2π·x/cogging_pitch + cogging_phase)
+                       + Σ_n curve_n·T_n(ξ),  n = 2 … 5
         |F_dry|      ≤ coulomb + load_coefficient·|F_t|
                        + stribeck·exp(−|v/stribeck_velocity|^stribeck_exponent) ± ½·asymmetry
 
     The upper sign is for positive v. Dry friction acts through a backlash and a spring of
     `compliance` in series. All of it acts through a spring of `mount_compliance` in series.
     Units are those of a sliding joint; for a turning joint, read rad for m and Nm for N.
+
+    T_n is the Chebyshev polynomial of degree n, and ξ = (x − curve_middle)/curve_half_range, held
+    within ±1: beyond the range in which a curve was identified, its force stays as at the end.
 
     The transmitted force is what reaches the guide from the body and the guide's own spring where
     the motion is given, and the actuator's force where the motion follows from a force
@@ -105,6 +120,22 @@ class Guide(NamedTuple):
     cogging: Annotated[float, Quantity("N", 0.0, 1e7, NONE)] = 0.0
     cogging_pitch: Annotated[float, Quantity("m", 1e-6, 100.0, NONE)] = 0.03
     cogging_phase: Annotated[float, Quantity("rad", -6.3, 6.3, NONE)] = 0.0
+    curve_2: Annotated[float, Quantity("N", -1e7, 1e7, NONE)] = 0.0
+    curve_3: Annotated[float, Quantity("N", -1e7, 1e7, NONE)] = 0.0
+    curve_4: Annotated[float, Quantity("N", -1e7, 1e7, NONE)] = 0.0
+    curve_5: Annotated[float, Quantity("N", -1e7, 1e7, NONE)] = 0.0
+    curve_middle: Annotated[float, Quantity("m", -1e3, 1e3, NONE)] = 0.0
+    curve_half_range: Annotated[float, Quantity("m", 1e-9, 1e3, NONE)] = 1.0
+
+
+SHAPES = (
+    "stribeck_velocity",
+    "stribeck_exponent",
+    "cogging_pitch",
+    "cogging_phase",
+    *FRAME,
+)
+"""Parameters of a guide that exert no force by themselves."""
 
 
 class Friction(NamedTuple):
@@ -266,12 +297,45 @@ def damping(guide: Guide, velocity: float) -> float:
 
 
 @compilable
-def position_force(guide: Guide, position: float, rest: float) -> float:
-    """Return spring, constant force and cogging at a position, N.
+def has_curve(guide: Guide) -> bool:
+    """Return whether the guide exerts a force that is a curve over the stroke."""
+    low = guide.curve_2 != 0.0 or guide.curve_3 != 0.0
+    return low or guide.curve_4 != 0.0 or guide.curve_5 != 0.0
 
-    F = stiffness·(x − rest) + offset + cogging·sin(2π·x/cogging_pitch + cogging_phase).
+
+@compilable
+def curve(guide: Guide, position: float) -> float:
+    """Return the smooth force over the stroke, N.
+
+    F = Σ_n curve_n·T_n(ξ), n = 2 … 5, with Chebyshev's polynomials T_n of the position ξ relative
+    to the range, which is held within ±1. A constant and a linear part are `offset` and
+    `stiffness`.
+    """
+    first = min(max((position - guide.curve_middle) / guide.curve_half_range, -1.0), 1.0)
+    # Chebyshev's recurrence: T_{n+1} = 2·ξ·T_n − T_{n−1}.
+    second = 2.0 * first * first - 1.0
+    third = 2.0 * first * second - first
+    fourth = 2.0 * first * third - second
+    fifth = 2.0 * first * fourth - third
+    even = guide.curve_2 * second + guide.curve_4 * fourth
+    return even + guide.curve_3 * third + guide.curve_5 * fifth
+
+
+@compilable
+def curve_size(guide: Guide) -> float:
+    """Return an upper bound of the magnitude of the curve's force, N."""
+    return abs(guide.curve_2) + abs(guide.curve_3) + abs(guide.curve_4) + abs(guide.curve_5)
+
+
+@compilable
+def position_force(guide: Guide, position: float, rest: float) -> float:
+    """Return spring, constant force, cogging and curve at a position, N.
+
+    F = stiffness·(x − rest) + offset + cogging·sin(2π·x/cogging_pitch + cogging_phase) + curve.
     """
     force = guide.stiffness * (position - rest) + guide.offset
+    if has_curve(guide):
+        force += curve(guide, position)
     if guide.cogging != 0.0:
         force += guide.cogging * math.sin(
             2.0 * math.pi * position / guide.cogging_pitch + guide.cogging_phase
@@ -337,6 +401,25 @@ def _cogging(context: Context) -> Starts:
     pitches = 2.0 * stroke / np.geomspace(WAVES, 40.0, 24)
     bounds = ((0.0, 1e7), (0.02 * stroke, 2.0 * stroke / WAVES), (-6.3, 6.3))
     return _waves(0.03 * force, pitches.tolist(), (0.003 * force, 0.002 * stroke, 0.05), bounds)
+
+
+def _curve(context: Context) -> Starts:
+    # The force is linear in the coefficients, so one start along each of them suffices.
+    low, high = context.scales.span
+    size = 0.05 * context.scales.force
+    middle, half = 0.5 * (low + high), max(0.5 * (high - low), SHORTEST)
+    # A range that is nearly symmetric about zero is centred there, where springs are slack: an odd
+    # force then needs no constant force beside it.
+    frame = (0.0, half + abs(middle)) if abs(middle) < NEARLY * half else (middle, half)
+    starts = tuple((*(size * row).tolist(), *frame) for row in np.eye(len(CURVE)))
+    return Starts(starts, (0.1 * size,) * len(CURVE) + (0.0, 0.0), is_linear=True)
+
+
+def curve_points(values: Mapping[str, float]) -> Points:
+    """Return positions and forces that tell the curve of a position-dependent force, m and N."""
+    guide = Guide(**values)
+    places = guide.curve_middle + guide.curve_half_range * np.linspace(-1.0, 1.0, TOLD)
+    return tuple((float(place), curve(guide, float(place))) for place in places)
 
 
 def late_starts(context: Context) -> Starts:
@@ -460,6 +543,16 @@ KINDS = (
         ("cogging", "cogging_pitch", "cogging_phase"),
         "force that alternates along the stroke",
         {Motor: _rig_cogging, Guide: _cogging},
+    ),
+    Kind(
+        "position_force",
+        "position-dependent force",
+        (*CURVE, *FRAME),
+        "a smooth force over the stroke beside a linear spring, as a cable or hardening has it",
+        {Guide: _curve},
+        magnitudes=len(CURVE),
+        constants=FRAME,
+        points=curve_points,
     ),
     Kind(
         "compliance",

@@ -4,17 +4,25 @@ Behind the mount, the guide's own position p differs from the measured position 
 
     x = p + c·f(p),   with the mount's compliance c and the guide's force f(p)
 
-The force is monotonic in p but for cogging, so the equilibrium is unique. It is computed case by
-case for piecewise linear friction, and refined by a bracketed secant search otherwise. Cogging that
-is steeper than the mount is stiff, 2π·cogging·mount_compliance > cogging_pitch, has several
-equilibria; one of them is returned.
+The force is monotonic in p but for cogging and a curve, so the equilibrium is unique. It is
+computed case by case for piecewise linear friction, and refined by a bracketed secant search
+otherwise. Cogging that is steeper than the mount is stiff, 2π·cogging·mount_compliance >
+cogging_pitch, has several equilibria; one of them is returned. So has such a curve.
 """
 
 from __future__ import annotations
 
 from controllers.compiled import compilable
 from rigtwin.components.effect import Kind, around_nominal
-from rigtwin.components.guide import Friction, Guide, damping, dry_limits, position_force, slide
+from rigtwin.components.guide import (
+    Friction,
+    Guide,
+    curve_size,
+    damping,
+    dry_limits,
+    position_force,
+    slide,
+)
 
 MOST = 60
 """Largest number of search steps. None is needed where only dry friction is nonlinear."""
@@ -136,8 +144,9 @@ def give_way(
     )
     error = position + compliance * force - outer
     # The mismatch p + c·f(p) − x has a slope of at least 1, so the equilibrium is no further away
-    # than the mismatch itself. Only cogging may fall with p, by twice its amplitude at most.
-    waves = 2.0 * compliance * guide.cogging
+    # than the mismatch itself. Only cogging and a curve may fall with p, by twice their amplitudes
+    # at most.
+    waves = 2.0 * compliance * (guide.cogging + curve_size(guide))
     low, high = min(position, position - error) - waves, max(position, position - error) + waves
     enough = CLOSE * abs(outer - inner) + ROUNDED * abs(outer)
     halve = False

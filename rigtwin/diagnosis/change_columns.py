@@ -63,8 +63,10 @@ def _of_effects(
         is_zero = measures(effect.of()) and effect.kind.name == "offset"
         starts = fitter.starts(effect)
         is_named = effect in named
-        # Zeros are nuisances. Limits, and waves of unknown phase, have no linear response to test.
-        if is_zero or effect.kind.name in LIMITS or (starts.quadrature and not is_named):
+        # Zeros are nuisances. Limits, and curves or waves of unknown shape, have no linear response
+        # to test.
+        has_shape = starts.quadrature or starts.is_linear
+        if is_zero or effect.kind.name in LIMITS or (has_shape and not is_named):
             continue
         if not is_named and not is_possible((*named, effect), plant):
             continue

@@ -93,8 +93,6 @@ def support_of(
     """
     best = posterior.best
     number = best.fit.effects.index(effect)
-    nominal = effect.nominal(evidence.plant)[effect.kind.parameters[0]]
-    width = max(best.widths[number][0], 1e-300)
     # Each signal counts by its share in the effect's response.
     reach = best.reach[number]
     rest = float(reach @ relative_rest(evidence, best.fit.plant))
@@ -107,7 +105,7 @@ def support_of(
     return Support(
         probability=posterior.inclusion(effect),
         margin=posterior.margin(effect),
-        steadiness=abs(best.fit.values[number][0] - nominal) / width,
+        steadiness=effect.steadiness(best.fit.values[number], best.widths[number], evidence.plant),
         remains=remains,
         dominance=_dominance(best, number),
         mimic=unnamed * _logistic(remains / thresholds.mimicry_share),

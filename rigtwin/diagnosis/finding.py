@@ -97,6 +97,8 @@ class Finding:
         Evidence behind the confidence. None where the effect is read off a signal directly.
     rivals
         The alternatives without the named effect, with the values that they would have.
+    curve
+        Positions and forces, SI, where the effect is a curve over the stroke.
     """
 
     name: Name
@@ -107,6 +109,7 @@ class Finding:
     title: str = ""
     support: Support | None = None
     rivals: tuple[Rival, ...] = ()
+    curve: tuple[tuple[float, float], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -390,4 +393,5 @@ def _finding_document(effect: Finding) -> dict[str, Any]:
             }
             for rival in effect.rivals
         ],
+        **({"curve": [list(point) for point in effect.curve]} if effect.curve else {}),
     }

@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 
 from rigtwin.components import Effect, find, title
+from rigtwin.components.effect import Points
 from rigtwin.components.plant import Plant
 from rigtwin.diagnosis.confidence import support_of
 from rigtwin.diagnosis.controller import Deviation
@@ -87,8 +88,8 @@ def choose_named(
         _standard_errors(explanation, support, thresholds),
         strict=True,
     ):
-        nominal = effect.nominal(posterior.nominal)[effect.kind.parameters[0]]
-        if abs(values[0] - nominal) <= thresholds.interval_half_width * widths[0]:
+        steadiness = effect.steadiness(values, widths, posterior.nominal)
+        if steadiness <= thresholds.interval_half_width:
             # The interval holds the nominal value, so the data do not ask for a change.
             continue
         shares = [
@@ -151,9 +152,15 @@ def describe_attributed(
                 rivals=tuple(
                     _describe_rival(rival, effect, explanation, evidence) for rival in rivals
                 ),
+                curve=_points(effect, values),
             )
         )
     return findings
+
+
+def _points(effect: Effect, values: Sequence[float]) -> Points:
+    points = effect.kind.points
+    return () if points is None else points(dict(zip(effect.kind.parameters, values, strict=True)))
 
 
 def _describe_rival(
@@ -195,13 +202,15 @@ def _standard_errors(
         explanation.fit.widths,
         strict=True,
     ):
-        nominal = effect.nominal(posterior.nominal)[effect.kind.parameters[0]]
         parts = zip(scored, fitted, posterior.spread(effect), strict=True)
         formal = [math.hypot(max(held_out, fit), spread) for held_out, fit, spread in parts]
-        distance = abs(values[0] - nominal)
+        # Several magnitudes are the coefficients of one force, which the bias shifts as a whole.
+        distance = max(effect.distances(values, posterior.nominal))
         bias = thresholds.rest_correlation / support[effect].dominance * distance
-        widest = max(formal[0], WIDEST * distance / thresholds.interval_half_width)
-        errors.append((min(math.hypot(formal[0], bias), widest), *formal[1:]))
+        widest = WIDEST * distance / thresholds.interval_half_width
+        count = effect.kind.magnitudes
+        widened = [min(math.hypot(width, bias), max(width, widest)) for width in formal[:count]]
+        errors.append((*widened, *formal[count:]))
     return errors
 
 
@@ -354,7 +363,7 @@ def estimates(
             effect.quantities().items(), values, widths, strict=True
         )
         # A secondary parameter of width zero was not fitted: no recorded motion depends on it.
-        if width > 0.0 or name == effect.kind.parameters[0]
+        if width > 0.0 or name in (effect.kind.parameters[0], *effect.kind.constants)
     }
 
 

@@ -130,8 +130,22 @@ class Fitter:
             ]
             force = max((float(np.sqrt(np.mean(column**2))) for column in forces), default=0.0)
             motion = self.evidence.models[longest].motion(component, self.plant)
-            self._scales[component] = Scales.of(motion, force, self.evidence.lines[longest].period)
+            period = self.evidence.lines[longest].period
+            position = self._measured_position(component)
+            self._scales[component] = Scales.of(motion, force, period, position)
         return self._scales[component]
+
+    def _measured_position(self, component: str) -> Array | None:
+        """Return the measured positions of a component's joint in all recordings, if any."""
+        described = self.evidence.machine.components
+        if component not in described:
+            return None
+        joint = described[component].joint
+        for number, row in enumerate(self.evidence.machine.rows):
+            same = row.name in described and described[row.name].joint == joint
+            if row.kind == "position" and joint is not None and same:
+                return np.concatenate([lines.measured[number] for lines in self.evidence.lines])
+        return None
 
     def _few_starts(self, effect: Effect, plant: Plant) -> list[tuple[float, ...]]:
         """Return a small and a middle magnitude of each shape and sign.
@@ -149,7 +163,7 @@ class Fitter:
         for values in shapes.values():
             values.sort(key=lambda start: abs(start[0] - nominal))
             few.append(values[len(values) // 2])
-            if effect.kind.name not in LIMITS and not starts.quadrature:
+            if effect.kind.name not in LIMITS and not starts.is_linear:
                 small = nominal + SMALL_START_BESIDE * (values[0][0] - nominal)
                 few.append((small, *values[0][1:]))
         return few
@@ -185,6 +199,8 @@ class Fitter:
         self._responses[effect] = responses
         if starts.quadrature:
             scored += self._blend(effect, responses)
+        elif starts.is_linear:
+            scored += self._combine(effect, responses)
         scored.sort()
         promise = max(self.nominal_fit.misfit - scored[0][0], self._promise(effect, responses))
         return Screened(effect, tuple(scored), promise)
@@ -261,6 +277,21 @@ class Fitter:
             )
             for _, start in blends[:REFINED_STARTS]
         ]
+
+    def _combine(
+        self, effect: Effect, responses: Responses
+    ) -> list[tuple[float, tuple[float, ...]]]:
+        """Return the linear combination of all starts that explains most, with its misfit."""
+        remainder = self.space.subtract_tolerances(self._nominal_residual)
+        columns = np.stack([response for _, response in responses], axis=1).astype(np.float64)
+        shapes = self.space.project_out(columns)
+        strengths = np.linalg.lstsq(shapes, remainder, rcond=None)[0]
+        count, nominal = effect.kind.magnitudes, tuple(effect.nominal(self.plant).values())
+        starts = np.array([start[:count] for start, _ in responses])
+        combined = np.array(nominal[:count]) + strengths @ (starts - np.array(nominal[:count]))
+        start = (*combined.tolist(), *responses[0][0][count:])
+        residual = self.evidence.residual(with_values(self.plant, (effect,), (start,)))
+        return [(self.space.misfit(residual), start)]
 
     def largest_response(self, effect: Effect) -> float:
         """Return the largest response of a screened effect that the tolerances cannot absorb.
@@ -340,10 +371,15 @@ class Fitter:
         tuple
             Values of this single effect.
         """
-        nominal = effect.nominal(self.plant)[effect.kind.parameters[0]]
+        nominal = tuple(effect.nominal(self.plant).values())
         if effect.kind.name in LIMITS:
             return (start,)
-        return ((nominal + share * (start[0] - nominal), *start[1:]),)
+        count = effect.kind.magnitudes
+        scaled = (
+            value + share * (begun - value)
+            for begun, value in zip(start[:count], nominal, strict=False)
+        )
+        return ((*scaled, *start[count:]),)
 
     def refit_with_tolerances(self, fit: Fit) -> Fit:
         """Refit effects with the responses to the tolerances taken at the fit.
@@ -390,7 +426,8 @@ class Fitter:
         if is_sufficient(fit.misfit, self.evidence.expected, SUFFICIENT_RATIO):
             return fit
         for number, effect in enumerate(fit.effects):
-            for place, share in product(range(len(effect.kind.parameters)), PERTURBATIONS):
+            fitted = len(effect.kind.parameters) - len(effect.kind.constants)
+            for place, share in product(range(fitted), PERTURBATIONS):
                 perturbed = list(fit.values[number])
                 # Magnitudes are scaled about their nominal value, shapes and limits about 0.
                 from_zero = place > 0 or effect.kind.name in LIMITS

@@ -100,9 +100,11 @@ class Linearised:
         for number, effect in enumerate(self._fit.effects):
             if number not in subset:
                 # An effect is absent if its magnitude is nominal; its shape is then irrelevant.
-                place = int(np.nonzero(self._owner == number)[0][0])
-                nominal = effect.nominal(self._fitter.plant)[effect.kind.parameters[0]]
-                move[place] = (nominal - self._values[place]) / self._steps[place]
+                first = int(np.nonzero(self._owner == number)[0][0])
+                nominal = tuple(effect.nominal(self._fitter.plant).values())
+                for place in range(effect.kind.magnitudes):
+                    change = nominal[place] - self._values[first + place]
+                    move[first + place] = change / self._steps[first + place]
         free = np.isin(self._owner, subset)
         right = self._gradient[free] + self._normal[np.ix_(free, ~free)] @ move[~free]
         move[free] = -np.linalg.solve(self._normal[np.ix_(free, free)], right)

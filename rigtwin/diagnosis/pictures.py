@@ -479,6 +479,7 @@ PICTURES: dict[str, str] = {
     "damping": "velocity",
     "damping_gain": "velocity",
     "cogging": "position",
+    "position_force": "position",
     "mass": "acceleration",
     "armature": "acceleration",
     "inertia": "acceleration",

@@ -29,6 +29,7 @@ RARE = (
     "compliance",
     "mount",
     "cogging",
+    "position_force",
     "relaxation",
     "drag",
     "load_friction",
@@ -104,7 +105,7 @@ class Prices:
     def price_effect(self, effect: Effect) -> float:
         """Return the gain that an effect must bring to be worth its parameters, nats."""
         t = self._thresholds
-        count = float(len(effect.kind.parameters) - len(effect.kind.nuisances))
+        count = float(len(effect.kind.fitted))
         starts = self._fitter.starts(effect)
         if starts.quadrature:
             # Each pitch of a wave is a hypothesis of its own, and was tried at two phases.
@@ -169,8 +170,7 @@ class Prices:
         for effect, values, widths in zip(
             scored.fit.effects, scored.fit.values, scored.widths, strict=True
         ):
-            change = abs(values[0] - self._nominal(effect))
-            steadiness = change / max(widths[0], 1e-300)
+            steadiness = effect.steadiness(values, widths, self._fitter.plant)
             shortfall = max(t.interval_half_width - steadiness, 0.0)
             steep = 1.0 + (shortfall / NOMINAL_DISTANCE) ** 2
             unsteady = max(t.steady_standard_errors - steadiness, 0.0)
@@ -180,6 +180,7 @@ class Prices:
                 width = evidence.width(tolerance)
                 if tolerance.relative:
                     width = tolerance.half_width * abs(self._nominal(effect))
+                change = effect.distances(values, self._fitter.plant)[0]
                 within = t.tolerance_half_widths - change / max(width, 1e-300)
                 price += t.prohibitive_price * float(np.clip(within, 0.0, 1.0))
         return price

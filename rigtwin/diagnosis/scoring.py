@@ -181,39 +181,47 @@ class Scorer:
         )
         if not count:
             return scored
-        places = [sum(sizes[:number]) for number in range(len(sizes))]
-        moves = self._moves(fit, values, steps, places)
+        moves = self._moves(fit, values, steps)
         return replace(
             scored,
             widths=_split(_standard_errors(products, expected, prior, count) * steps, sizes),
-            reach=_reach(places, products),
-            together=_together(moves, places, products),
-            accounts=self._accounts(moves, places, products, prior),
+            reach=_reach(moves, products),
+            together=_together(moves, products),
+            accounts=self._accounts(moves, products, prior),
             rest=self._rest(products, expected),
             bounded=fitter.is_bounded(fit),
         )
 
-    def _moves(self, fit: Fit, values: Array, steps: Array, places: Sequence[int]) -> Array:
-        """Return the difference of each magnitude from nominal, in steps, shape (effects,).
+    def _moves(self, fit: Fit, values: Array, steps: Array) -> Array:
+        """Return the difference of each effect's magnitudes from nominal, in steps.
 
-        `places` has the position of each effect's magnitude among all parameters.
+        The shape is (parameters, effects); parameters that are no magnitude of the effect are 0.
         """
-        nominal = [
-            effect.nominal(self._fitter.plant)[effect.kind.parameters[0]] for effect in fit.effects
-        ]
-        return (values[places] - np.array(nominal)) / steps[places]
+        moves, place = np.zeros((len(values), len(fit.effects))), 0
+        for number, effect in enumerate(fit.effects):
+            nominal = effect.nominal(self._fitter.plant)
+            for offset, name in enumerate(effect.kind.parameters):
+                if offset < effect.kind.magnitudes:
+                    change = values[place + offset] - nominal[name]
+                    moves[place + offset, number] = change / steps[place + offset]
+            place += len(effect.kind.parameters)
+        return moves
 
-    def _accounts(
-        self, moves: Array, places: Sequence[int], products: Array, prior: Array
-    ) -> Array:
+    def _accounts(self, moves: Array, products: Array, prior: Array) -> Array:
         """Return the share of the signals' amplitude that each effect accounts for.
 
-        To first order, moving a parameter back by m while all others are refitted raises the
-        chi-square by m^2 / (N^-1)_ii, with N the normal matrix.
+        To first order, moving parameters back by m while all others are refitted raises the
+        chi-square by m' C^-1 m, with C the block of these parameters in N^-1 and N the normal
+        matrix.
         """
         inverse = np.linalg.inv(_normal_matrix(products, prior))
-        power = moves**2 / np.maximum(np.diag(inverse)[places], TINY)
-        return np.asarray(np.sqrt(power / self._signal_power))
+        power = np.zeros(moves.shape[1])
+        for number, column in enumerate(moves.T):
+            places = np.nonzero(column)[0]
+            if len(places):
+                block = inverse[np.ix_(places, places)]
+                power[number] = column[places] @ np.linalg.solve(block, column[places])
+        return np.asarray(np.sqrt(np.maximum(power, 0.0) / self._signal_power))
 
     def _rest(self, products: Array, expected: Array) -> Array:
         """Return each signal's residual beyond noise and declared error, as a share of all
@@ -222,12 +230,13 @@ class Scorer:
         return np.asarray(np.sqrt(np.maximum(beyond, 0.0) / self._signal_power))
 
 
-def _together(moves: Array, places: Sequence[int], products: Array) -> Array:
+def _together(moves: Array, products: Array) -> Array:
     """Return the joint response of each pair of effects relative to the smaller single response.
 
     With responses a and b, |a + b| / min(|a|, |b|). Pairs that do not oppose each other have 1.
     """
-    gram = products.sum(axis=(0, 1, 2, 3))[np.ix_(places, places)] * np.outer(moves, moves)
+    count = len(moves)
+    gram = moves.T @ products.sum(axis=(0, 1, 2, 3))[:count, :count] @ moves
     size = np.diag(gram)
     both = np.maximum(size[:, None] + size[None, :] + 2.0 * gram, 0.0)
     least = np.minimum(size[:, None], size[None, :])
@@ -238,9 +247,11 @@ def _together(moves: Array, places: Sequence[int], products: Array) -> Array:
     return np.minimum(relative, 1.0)
 
 
-def _reach(places: Sequence[int], products: Array) -> Array:
-    """Return the share of each signal in the response to each effect's magnitude."""
-    power = np.stack([products[..., place, place].sum(axis=(0, 2, 3)) for place in places])
+def _reach(moves: Array, products: Array) -> Array:
+    """Return the share of each signal in the response to each effect, shape (effects, signals)."""
+    count = len(moves)
+    signals = products.sum(axis=(0, 2, 3))[:, :count, :count]
+    power = np.einsum("pe,spq,qe->es", moves, signals, moves)
     return np.asarray(power / np.maximum(power.sum(axis=1, keepdims=True), TINY))
 
 

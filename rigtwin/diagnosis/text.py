@@ -90,6 +90,8 @@ def _effect_lines(diagnosis: Answer) -> Iterator[str]:
         yield f"  {effect.name}, confidence {confidence:.0f} %, share of the gap {share:.0f} %"
         for name, estimate in effect.parameters.items():
             yield f"    {name} = {format_estimate(estimate)}"
+        if effect.curve:
+            yield f"    force at a position: {_list_curve(effect)}"
         if effect.rivals:
             yield f"    these data cannot distinguish it from {_list_rivals(effect)}"
     if (nearest := diagnosis.nearest) is not None:
@@ -150,6 +152,20 @@ def _list_values(parameters: dict[str, Estimate]) -> str:
     return ", ".join(
         f"{name} {write(estimate.value, estimate.unit)}" for name, estimate in parameters.items()
     )
+
+
+def _list_curve(effect: Finding) -> str:
+    """List positions and forces of an effect that is a curve over the stroke."""
+    force, length = _curve_units(effect)
+    return ", ".join(
+        f"{write(height, force)} at {write(place, length)}" for place, height in effect.curve
+    )
+
+
+def _curve_units(effect: Finding) -> tuple[str, str]:
+    """Return the units of a curve's force and position: those of its first and last parameter."""
+    units = [estimate.unit for estimate in effect.parameters.values()]
+    return units[0], units[-1]
 
 
 def _list_rivals(effect: Finding) -> str:
@@ -222,12 +238,18 @@ def _with_article(component: str) -> str:
 
 
 def _describe_effect(effect: Finding) -> str:
-    """Describe an effect by its first parameter, its nominal value and its confidence."""
+    """Describe an effect by its first parameter, or its curve, and its confidence."""
     name, estimate = next(iter(effect.parameters.items()))
     value, nominal, _, unit = against_nominal(estimate)
     reference = nominal if nominal == "none" else f"{nominal}{unit}"
-    title = f"setting {name}" if effect.name.kind == "setting" else effect.title
     likely = f"{100 * effect.confidence:.0f} %"
+    if effect.curve:
+        forces = [height for _, height in effect.curve]
+        unit = _curve_units(effect)[0]
+        ends = f"{write(min(forces), unit)} to {write(max(forces), unit)}"
+        title = f"{indefinite_article(effect.title)} {effect.title}"
+        return f"{title} from {ends} over the stroke (confidence {likely})"
+    title = f"setting {name}" if effect.name.kind == "setting" else effect.title
     return (
         f"{indefinite_article(title)} {title} of {value}{unit} instead of {reference} "
         f"(confidence {likely})"

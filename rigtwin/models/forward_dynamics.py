@@ -29,7 +29,7 @@ from rigtwin.components import (
 from rigtwin.components.body import list_parameters, list_surplus, turn_gravity
 from rigtwin.components.conditioning import actuator, condition_all, hold
 from rigtwin.components.effect import Motion
-from rigtwin.components.guide import Friction, friction, friction_size
+from rigtwin.components.guide import SHAPES, Friction, friction, friction_size
 from rigtwin.components.plant import Plant
 from rigtwin.components.sensors import apply_sensor
 from rigtwin.components.servo import Push, push, push_law
@@ -47,8 +47,6 @@ from rigtwin.numerics.arrays import Array, clip_diverged, interpolate
 from rigtwin.recording import Inputs
 from rigtwin.signals.noise import smooth, white_noise
 
-SHAPES = ("stribeck_velocity", "stribeck_exponent", "cogging_pitch", "cogging_phase")
-"""Parameters of a guide that have no effect without another parameter."""
 COMMANDED = "/command"
 """Topic of the signals that are held from tick to tick."""
 COARSER = 2.0

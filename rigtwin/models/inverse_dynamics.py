@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from rigtwin.components import Base, Body, Guide, PositionSensor, Rotor, measures
 from rigtwin.components.body import list_surplus
 from rigtwin.components.effect import Motion
-from rigtwin.components.guide import friction, friction_size
+from rigtwin.components.guide import SHAPES, friction, friction_size
 from rigtwin.components.plant import Plant
 from rigtwin.components.sensors import apply_sensor
 from rigtwin.description.machine import Component, Machine, ReplayOf, Row
@@ -208,12 +208,7 @@ class InverseDynamicsModel(Model[Plant]):
             return component.inertia * (along @ motion[2])
         guide = Guide(*(float(value) for value in component))
         # A guide whose only values are the shapes of absent effects exerts no force.
-        if guide == Guide(
-            stribeck_velocity=guide.stribeck_velocity,
-            stribeck_exponent=guide.stribeck_exponent,
-            cogging_pitch=guide.cogging_pitch,
-            cogging_phase=guide.cogging_phase,
-        ):
+        if guide == Guide()._replace(**{name: getattr(guide, name) for name in SHAPES}):
             return np.zeros(motion.shape[2])
         guide_motion = np.ascontiguousarray(np.einsum("j,kjt->kt", along, motion))
         load = along @ bodies / float(along @ along)

@@ -47,7 +47,7 @@ def test_sizes_of_what_stands_still_are_tiny_but_not_zero():
     scales = Scales.of(Motion(0.0 * TIME, 0.0 * TIME, 0.0 * TIME), 0.0, PERIOD)
     sizes = (scales.stroke, scales.speed, scales.fastest, scales.acceleration, scales.force)
     assert sizes == (1e-12,) * 5
-    quick = Scales(1e-6, 1.0, 1.0, 1.0, 1.0, PERIOD)
+    quick = Scales(1e-6, (0.0, 0.0), 1.0, 1.0, 1.0, 1.0, PERIOD)
     assert quick.time == PERIOD
 
 

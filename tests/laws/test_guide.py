@@ -200,6 +200,32 @@ def test_the_nominal_wave_has_a_pitch_of_30_mm_and_no_phase():
     assert position_force(guide, 0.0225, 0.0) == pytest.approx(-3.0)
 
 
+HILLS = Guide(
+    curve_2=4.0,
+    curve_3=-2.0,
+    curve_4=1.5,
+    curve_5=0.7,
+    curve_middle=0.01,
+    curve_half_range=0.05,
+)
+
+
+@law_of("position_force", Guide)
+@pytest.mark.parametrize("position", [-0.04, -0.011, 0.0, 0.01, 0.0331, 0.06])
+def test_a_curve_over_the_stroke_is_a_chebyshev_series(position):
+    """F = Σ c_n cos(n·arccos ξ) with ξ = (x − 0.01)/0.05."""
+    angle = math.acos((position - 0.01) / 0.05)
+    heights = (0.0, 0.0, 4.0, -2.0, 1.5, 0.7)
+    expected = sum(height * math.cos(n * angle) for n, height in enumerate(heights))
+    assert position_force(HILLS, position, 0.0) == pytest.approx(expected, abs=1e-12)
+
+
+def test_beyond_its_range_a_curve_stays_as_at_the_end():
+    up, down = (position_force(HILLS, 0.01 + end, 0.0) for end in (0.05, -0.05))
+    assert position_force(HILLS, 0.5, 0.0) == up == pytest.approx(4.0 - 2.0 + 1.5 + 0.7)
+    assert position_force(HILLS, -0.5, 0.0) == down == pytest.approx(4.0 + 2.0 + 1.5 - 0.7)
+
+
 @law_of("drag", Guide)
 def test_quadratic_friction_grows_with_the_square_of_the_speed():
     force = force_to_move(Guide(drag=800.0), SINE)

@@ -26,6 +26,7 @@ GUIDES = [
     Guide(5.0, 400.0, 300.0, relaxation=0.02, mount_compliance=3e-4),
     Guide(10.0, 100.0, 500.0, backlash=0.004, mount_compliance=2e-4, offset=3.0),
     Guide(0.5, cogging=8.0, cogging_pitch=0.002, cogging_phase=1.0, mount_compliance=2e-4),
+    Guide(2.0, curve_2=3.0, curve_3=-900.0, curve_half_range=0.4, mount_compliance=2e-4),
 ]
 STATES = [
     (outer, inner, speed, slider, viscous, load)
@@ -64,6 +65,8 @@ def written_resistance(
     lagging = viscous + share * ((guide.viscous + uneven) * v - viscous)
     wave = math.sin(2.0 * math.pi * position / guide.cogging_pitch + guide.cogging_phase)
     force = guide.stiffness * (position - REST) + guide.offset + guide.cogging * wave
+    bent = math.acos(min(max(position / guide.curve_half_range, -1.0), 1.0))
+    force += guide.curve_2 * math.cos(2.0 * bent) + guide.curve_3 * math.cos(3.0 * bent)
     return force + dry + lagging + guide.drag * v * abs(v), slid, lagging
 
 
@@ -103,7 +106,7 @@ def test_the_mounts_stretch_is_its_compliance_times_all_that_the_guide_does(guid
     assert directly == pytest.approx(expected, abs=1e-9)
 
 
-@pytest.mark.parametrize("guide", [g for g in GUIDES if g.drag == g.cogging == 0.0])
+@pytest.mark.parametrize("guide", [g for g in GUIDES if g.drag == g.cogging == g.curve_3 == 0.0])
 @pytest.mark.parametrize("shares", STATES)
 def test_where_only_dry_friction_is_nonlinear_the_first_guess_is_the_equilibrium(guide, shares):
     outer, inner, speed, slider, viscous, load = (

@@ -60,7 +60,7 @@ NOMINAL: dict[type, dict[str, float]] = {
     },
     ForceSensor: {"gain": 1.0},
     GasSpring: {"length": 0.217, "exponent": 1.4},
-    Guide: {**STRIBECK, "cogging_pitch": 0.03},
+    Guide: {**STRIBECK, "cogging_pitch": 0.03, "curve_half_range": 1.0},
     LoadCell: {"white": 1.5, "hum": 5.0, "resolution": 0.076, "gain": 1.0},
     Lvdt: {"white": 6e-5, "hum": 2e-4, "resolution": 4.6e-6, "gain": 1.0},
     Mains: {"frequency": 50.0},

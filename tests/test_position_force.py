@@ -1,0 +1,73 @@
+"""A smooth force over the stroke: found at its shape, and only where no simpler effect will do."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import rigtwin
+from rigtwin.components import Guide
+from rigtwin.components.guide import curve, curve_points, position_force
+from rigtwin.diagnosis.text import describe
+from tests.helpers.described import NOISY, described
+
+HARDENING = ("position_force@guide=0.0,curve_3=15.0,curve_half_range=0.4", "stiffness@guide=240")
+"""A spring of 128 N/m whose force grows by 60 N·(x/0.4 m)³."""
+
+
+SETTINGS = {"timing": {"duration": 4.0}}
+
+
+@pytest.fixture(scope="module")
+def machine(tmp_path_factory: pytest.TempPathFactory) -> rigtwin.Machine:
+    folder = tmp_path_factory.mktemp("bench")
+    described(folder, "slide", NOISY)
+    return rigtwin.machine(folder / "bench.toml")
+
+
+@pytest.fixture(scope="module")
+def hardened(machine: rigtwin.Machine) -> rigtwin.Diagnosis:
+    recording = rigtwin.run(machine, "shake", seed=1, effects=HARDENING, settings=SETTINGS)
+    return rigtwin.diagnose(recording)
+
+
+def test_a_hardening_spring_is_found(hardened: rigtwin.Diagnosis):
+    assert hardened.verdict == "explained", hardened.sentence
+    assert {str(finding.name) for finding in hardened.effects} == {
+        "position_force@guide",
+        "stiffness@guide",
+    }
+    guide = hardened.corrected.plant.guide
+    for position in np.linspace(-0.3, 0.3, 7):
+        expected = 127.5 * position + 60.0 * (position / 0.4) ** 3
+        assert position_force(guide, position, 0.0) == pytest.approx(expected, abs=1.0)
+
+
+def test_it_is_told_by_its_forces_and_not_by_a_coefficient(hardened: rigtwin.Diagnosis):
+    assert "position-dependent force from -" in hardened.sentence
+    assert "over the stroke" in hardened.sentence
+    assert "force at a position: " in describe(hardened.answer)
+
+
+def test_the_corrected_twin_has_it(hardened: rigtwin.Diagnosis):
+    guide = hardened.corrected.plant.guide
+    finding = next(found for found in hardened.effects if found.curve)
+    assert [curve(guide, place) for place, _ in finding.curve] == pytest.approx(
+        [force for _, force in finding.curve]
+    )
+
+
+def test_a_spring_stays_a_spring(machine: rigtwin.Machine):
+    recording = rigtwin.run(
+        machine, "shake", seed=1, effects=["stiffness@guide=700"], settings=SETTINGS
+    )
+    (finding,) = rigtwin.diagnose(recording).effects
+    assert str(finding.name) == "stiffness@guide"
+
+
+def test_a_curve_is_told_from_end_to_end():
+    values = Guide(curve_2=5.0, curve_middle=0.1, curve_half_range=0.2)._asdict()
+    points = curve_points(values)
+    assert [place for place, _ in points] == pytest.approx(np.linspace(-0.1, 0.3, 7))
+    assert points[0][1] == points[-1][1] == pytest.approx(5.0)
+    assert points[3][1] == pytest.approx(-5.0)
