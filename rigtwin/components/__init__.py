@@ -18,6 +18,7 @@ from rigtwin.components.plant import Plant, with_parameters
 from rigtwin.components.quantity import UNLIMITED
 from rigtwin.components.rig import RigPlant
 from rigtwin.components.rotor import Rotor
+from rigtwin.components.schedule import Schedule
 from rigtwin.components.sensors import (
     ForceSensor,
     LoadCell,
@@ -58,6 +59,7 @@ __all__ = [
     "RigPlant",
     "Rotor",
     "Scales",
+    "Schedule",
     "Servo",
     "Starts",
     "Swing",

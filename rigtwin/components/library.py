@@ -9,14 +9,25 @@ from __future__ import annotations
 from collections.abc import Iterator
 from difflib import get_close_matches
 
-from rigtwin.components import body, computer, conditioning, guide, mass, mount, rotor, servo, tyre
+from rigtwin.components import (
+    body,
+    computer,
+    conditioning,
+    guide,
+    mass,
+    mount,
+    rotor,
+    schedule,
+    servo,
+    tyre,
+)
 from rigtwin.components.effect import Effect, Kind
 from rigtwin.components.plant import Plant
 from rigtwin.errors import RigtwinError
 
 KINDS: tuple[Kind, ...] = tuple(
     kind
-    for module in (guide, mount, mass, body, rotor, tyre, conditioning, servo, computer)
+    for module in (guide, mount, mass, body, rotor, tyre, conditioning, servo, schedule, computer)
     for kind in module.KINDS
 )
 

@@ -24,6 +24,7 @@ TYPES: dict[str, type] = {
     "base": components.Base,
     "guide": components.Guide,
     "rotor": components.Rotor,
+    "schedule": components.Schedule,
     "force actuator": components.ForceActuator,
     "servo": components.Servo,
     "position actuator": components.PositionActuator,
@@ -50,6 +51,8 @@ PUSHING = ("force actuator", "servo")
 """Types that exert a force on a joint, whose motion follows by forward dynamics."""
 MOVING = (*PUSHING, "position actuator", "motor", "cylinder")
 """Types that take a command."""
+READ = (*SENSED, "schedule")
+"""Types that have a recorded channel which nothing commands."""
 UNITS = {"position": ("m", "rad"), "velocity": ("m/s", "rad/s"), "force": ("N", "Nm")}
 """Measured quantity → its unit at a slide and at a hinge."""
 AT: dict[str, tuple[str, ...]] = {
@@ -61,6 +64,7 @@ AT: dict[str, tuple[str, ...]] = {
     "rail": ("joint",),
     "rotor": ("joint", "tendon"),
     "gas spring": ("joint", "tendon"),
+    "schedule": ("joint",),
     "tyre": ("contact",),
     "cylinder": ("joint", "actuator"),
     **dict.fromkeys((*PUSHING, "position actuator", "motor"), ("actuator",)),
@@ -189,11 +193,13 @@ class Components:
                     f"unit {table['unit']!r}: recordings are in SI, "
                     f"here {unit!r}; rigtwin import converts",
                 )
+        elif kind == "schedule":
+            channel = ("/sensor", str(table.get("channel", name)))
         elif kind in MOVING:
             channel = ("/command", str(table.get("command", name)))
             if kind in ("position actuator", "servo", "cylinder"):
                 unit = UNITS["position"][turns]
-        for key, fits in (("channel", kind in SENSED), ("command", kind in MOVING)):
+        for key, fits in (("channel", kind in READ), ("command", kind in MOVING)):
             if key in table and not fits:
                 self.mistakes.note(
                     where,

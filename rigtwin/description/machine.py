@@ -28,6 +28,8 @@ FORM = {"position": 0.003, "velocity": 0.003, "force": 0.01, "command": 0.01}
 accurately than motions."""
 OWN = "own"
 """Entry of a recording's controller settings that marks a custom controller."""
+PER_CHANNEL = " per unit of the channel"
+"""End of the unit of a parameter that refers to a recorded channel."""
 TURNING = {
     "m": "rad",
     "N": "Nm",
@@ -389,7 +391,9 @@ class Machine:
             return unit
         if "unit of the command" in unit:
             unit = unit.replace("unit of the command", component.unit or "1")
-        return TURNING.get(unit, unit) if component.turns else unit
+        unit, per, _ = unit.partition(PER_CHANNEL)
+        turned = TURNING.get(unit, unit) if component.turns else unit
+        return f"{turned}/{component.unit}" if per and component.unit else turned
 
 
 SYNONYMS = {"gain": "constant", "lag": "delay"}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from rigtwin.description.component_tables import MOVING, PUSHING, SENSED, WHOLE, Components
@@ -189,9 +189,27 @@ class Replays:
             parts[kind] = names[0] if names else None
         return parts
 
+    def _check_schedules(self, replays: Iterable[ReplayOf]) -> None:
+        """Note schedules at joints whose motion no sensor prescribes: only there are they known."""
+        components = self._components
+        measured = {
+            components.by_name[mover].joint
+            for replay in replays
+            for mover in replay.moved_by
+            if components.types[mover] in SENSED
+        }
+        for name, kind in components.types.items():
+            if kind == "schedule" and components.by_name[name].joint not in measured:
+                self._mistakes.note(
+                    f"[components.{name}]",
+                    "type 'schedule' goes with a joint that moves as measured; expected a replay "
+                    f"of joint {components.by_name[name].joint} that is moved_by a sensor",
+                )
+
     def physics(self, replays: tuple[ReplayOf, ...]) -> Physics:
         """Return the physics of the machine; note components that do not fit it."""
         physics = self._components.physics(replays)
+        self._check_schedules(replays)
         if physics.replayed_whole:
             return physics
         together = [replay for replay in replays if replay.free or len(replay.moved_by) > 1]

@@ -8,6 +8,7 @@ from itertools import permutations
 
 import numpy as np
 
+from rigtwin.components import Schedule
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import OWN, Machine, Row
 from rigtwin.diagnosis.dead_commands import dead_commands
@@ -144,6 +145,11 @@ def channels(machine: Machine) -> list[tuple[str, str]]:
         movers = [machine.components[name].channel for name in replay.moved_by]
         required += [channel for channel in movers if channel is not None and not replay.closed]
         required += [row.channel for row in replay.rows]
+    required += [
+        component.channel
+        for name, component in machine.components.items()
+        if component.channel is not None and isinstance(getattr(machine.plant, name), Schedule)
+    ]
     if machine.control is not None:
         required += machine.control.channels
         required += [("/command", name) for name in machine.control.outputs]

@@ -57,6 +57,7 @@ from rigtwin.diagnosis.support import Support
 from rigtwin.diagnosis.text import sentence
 from rigtwin.diagnosis.thresholds import STANDARD, Thresholds
 from rigtwin.diagnosis.unknown_input import DisturbanceFit, locate_disturbance
+from rigtwin.diagnosis.unused_channels import describe_unused
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
 from rigtwin.simulation.energy import EnergyError
@@ -413,6 +414,7 @@ def _collect_notes(evidence: Evidence, judged: _Judged, readings: _Readings) -> 
         *find_stops(evidence.machine, evidence.recordings),
         *find_cut_commands(evidence.machine, evidence.recordings),
         *judged.notes,
+        *describe_unused(evidence, judged.plant),
         *map(describe_negligible, readings.negligible),
     ]
 

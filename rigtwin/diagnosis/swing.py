@@ -6,13 +6,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from rigtwin.components import Schedule
 from rigtwin.components.effect import SHARES, Swing
 from rigtwin.description.machine import Machine
 from rigtwin.recording import Recording
 
 
 def swings(machine: Machine, recordings: Sequence[Recording]) -> dict[str, Swing]:
-    """Return the swing of each command over all recordings.
+    """Return the swing of each command and of each channel that forces follow.
 
     Saturations and rate limits start from it: a limit that the commands never reach has no effect.
 
@@ -26,11 +27,12 @@ def swings(machine: Machine, recordings: Sequence[Recording]) -> dict[str, Swing
     Returns
     -------
     dict
-        Quantiles of a command's size and rate, by the component that it moves.
+        Quantiles of a signal's size and rate, by the component that it moves or changes.
     """
     by_component: dict[str, Swing] = {}
     for component in machine.components.values():
-        if component.channel is None or component.channel[0] != "/command":
+        followed = isinstance(getattr(machine.plant, component.name), Schedule)
+        if component.channel is None or (component.channel[0] != "/command" and not followed):
             continue
         columns = [
             (r.column(*component.channel), r.period)

@@ -14,6 +14,7 @@ import numpy as np
 
 from rigtwin.models.model import Form
 from rigtwin.numerics.arrays import Array
+from rigtwin.numerics.filters import low_pass
 
 WAVES = (0.005, 0.008, 0.012, 0.018, 0.028)
 """Wavelengths of the rail's friction along its length, m."""
@@ -55,32 +56,6 @@ class Passage:
     def acceleration(self) -> Array:
         """Acceleration, m/s², shape (ticks,)."""
         return np.gradient(self.speed, self.period)
-
-
-def low_pass(signal: Array, time_constant: float, period: float) -> Array:
-    """Filter a signal by a first-order lag, T·y' = u − y, that starts settled.
-
-    Parameters
-    ----------
-    signal
-        Signal u, shape (ticks,).
-    time_constant
-        Time constant T, s.
-    period
-        Time from tick to tick, s.
-
-    Returns
-    -------
-    array
-        Filtered signal y, shape (ticks,).
-    """
-    # Implicit Euler: stable for any time constant.
-    share = period / (time_constant + period)
-    start = [(1.0 - share) * signal[0]]
-    from scipy.signal import lfilter  # Imported late: scipy is slow to load.
-
-    out, _ = lfilter([share], [1.0, share - 1.0], signal, zi=start)
-    return np.asarray(out)
 
 
 def _past(signal: Array, seconds: Sequence[float], period: float) -> NamedSignals:

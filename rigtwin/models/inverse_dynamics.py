@@ -18,11 +18,12 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from rigtwin.components import Base, Body, Guide, PositionSensor, Rotor, measures
+from rigtwin.components import Base, Body, Guide, PositionSensor, Rotor, Schedule, measures
 from rigtwin.components.body import list_surplus
 from rigtwin.components.effect import Motion
 from rigtwin.components.guide import SHAPES, friction, friction_size
 from rigtwin.components.plant import Plant
+from rigtwin.components.schedule import follow, scheduled_force
 from rigtwin.components.sensors import apply_sensor
 from rigtwin.description.machine import Component, Machine, ReplayOf, Row
 from rigtwin.models.basis import Passage, forms
@@ -84,7 +85,8 @@ class InverseDynamicsModel(Model[Plant]):
         self._row_of = {
             components[row.name].joint: number for number, row in enumerate(replay.rows)
         }
-        at: dict[type, list[Component]] = {Guide: [], Rotor: [], Body: [], Base: []}
+        kinds = (Guide, Rotor, Body, Base, Schedule)
+        at: dict[type, list[Component]] = {kind: [] for kind in kinds}
         for component in components.values():
             at.get(type(getattr(machine.plant, component.name)), []).append(component)
         self._bodies = RigidBodies(machine.model, joints, at[Guide], at[Rotor])
@@ -94,7 +96,7 @@ class InverseDynamicsModel(Model[Plant]):
         """Component → its direction in the joints, shape (joints,)."""
         self._onto: dict[str, Array] = {}
         """Component → share of its force in each observed row, shape (rows,)."""
-        for component in (*at[Guide], *at[Rotor]):
+        for component in (*at[Guide], *at[Rotor], *at[Schedule]):
             along, onto = np.zeros(len(joints)), np.zeros(len(self.rows))
             for joint, coefficient in component.acts_on:
                 if joint in self._place:
@@ -103,6 +105,12 @@ class InverseDynamicsModel(Model[Plant]):
                     onto[self._row_of[joint]] = coefficient
             if onto.any():
                 self._along[component.name], self._onto[component.name] = along, onto
+        self._schedules = {
+            component.name: inputs.column(*component.channel)
+            for component in at[Schedule]
+            if component.channel is not None
+        }
+        """Name of each schedule → values of its channel, shape (ticks,)."""
         self._read: Mapping[str, tuple[Array, float]] = (
             like._read
             if like is not None
@@ -206,6 +214,12 @@ class InverseDynamicsModel(Model[Plant]):
         component, along = getattr(plant, name), self._along[name]
         if isinstance(component, Rotor):
             return component.inertia * (along @ motion[2])
+        if isinstance(component, Schedule):
+            own_motion = np.einsum("j,kjt->kt", along, motion)
+            error = self._position_error(along)
+            over = max(ELASTIC * error, 1e-9 * max(float(np.ptp(own_motion[0])), 1e-12))
+            level = follow(component, self._schedules[name], self._period)[:: self.every]
+            return scheduled_force(component, level, own_motion, 1.0 / over)
         guide = Guide(*(float(value) for value in component))
         # A guide whose only values are the shapes of absent effects exerts no force.
         if guide == Guide()._replace(**{name: getattr(guide, name) for name in SHAPES}):
@@ -234,10 +248,14 @@ class InverseDynamicsModel(Model[Plant]):
         at least that distance.
         """
         size = max(friction_size(friction(guide), float(np.sqrt(np.mean(load**2)))), 1e-300)
-        errors = np.array([self._read[name][1] for name in self._movers])
-        error = float(np.sqrt(np.sum((along * errors) ** 2)))
+        error = self._position_error(along)
         stroke = max(float(np.ptp(motion[0])), 1e-12)
         return max(guide.compliance, ELASTIC * error / size, 1e-9 * stroke / size)
+
+    def _position_error(self, along: Array) -> float:
+        """Return the standard error of the measured position along a direction, m."""
+        errors = np.array([self._read[name][1] for name in self._movers])
+        return float(np.sqrt(np.sum((along * errors) ** 2)))
 
     def _force_of(self, name: str, plant: Plant) -> Array:
         """Return `_share_of` at the plant's own motion, remembered."""
@@ -283,7 +301,8 @@ class InverseDynamicsModel(Model[Plant]):
         return predicted
 
     def components(self) -> tuple[str, ...]:
-        return (*self._onto, *(row.name for row in self.rows))
+        own = (name for name in self._onto if name not in self._schedules)
+        return (*own, *(row.name for row in self.rows))
 
     def _passage(self, component: str, plant: Plant) -> tuple[Kinematics, Array, Array]:
         """Return a component's motion, shape (3, ticks), its load and its force, N."""

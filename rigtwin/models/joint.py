@@ -20,12 +20,14 @@ from rigtwin.components import (
     PositionActuator,
     PositionSensor,
     Pusher,
+    Schedule,
     measures,
 )
 from rigtwin.components.conditioning import actuator, condition_all, hold
 from rigtwin.components.effect import Motion
 from rigtwin.components.guide import friction, friction_size
 from rigtwin.components.plant import Plant
+from rigtwin.components.schedule import follow, scheduled_force
 from rigtwin.components.sensors import (
     Sensor,
     apply_sensor,
@@ -160,6 +162,14 @@ class JointModel(Model[Plant]):
             and component.channel in self._controller_inputs.values()
             and measures(getattr(machine.plant, name)) in ("position", "velocity")
         ]
+        self._schedules: dict[str, Array] = {
+            name: inputs.column(*component.channel)
+            for name, component in machine.components.items()
+            if component.joint == replay.joint.name
+            and component.channel is not None
+            and isinstance(getattr(machine.plant, name), Schedule)
+        }
+        """Name of each schedule of the joint → values of its channel, shape (ticks,)."""
         self._last: dict[tuple[object, ...], Array] = {}
         self._starts: dict[tuple[object, ...], Start] = {}
         self._smoothed: dict[str, tuple[Array, float]] = {}
@@ -286,6 +296,7 @@ class JointModel(Model[Plant]):
         """Return all components that the motion depends on, as a key of remembered motions."""
         replay = self._replay
         names = [replay.guide, replay.mass, replay.rotor, self._mover.name, "computer"]
+        names += self._schedules
         if self._control is not None:
             names += self._sensors
         if self._start is not None and self._start.name not in names:
@@ -388,6 +399,13 @@ class JointModel(Model[Plant]):
             motion=motion,
             out=out[2],
         )
+        if self._schedules:
+            stroke = max(float(np.ptp(position)), 1e-12)
+            over = max(ELASTIC * error, 1e-9 * stroke)
+            for name, recorded in self._schedules.items():
+                schedule = getattr(plant, name)
+                level = follow(schedule, recorded, self._period)[:: self.every]
+                out[2] += scheduled_force(schedule, level, motion, 1.0 / over)
         return out
 
     def _softest(

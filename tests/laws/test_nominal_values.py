@@ -25,6 +25,7 @@ from rigtwin.components import (
     Rail,
     RigPlant,
     Rotor,
+    Schedule,
     Servo,
     Tyre,
     VelocitySensor,
@@ -65,6 +66,7 @@ NOMINAL: dict[type, dict[str, float]] = {
     Lvdt: {"white": 6e-5, "hum": 2e-4, "resolution": 4.6e-6, "gain": 1.0},
     Mains: {"frequency": 50.0},
     Mass: {},
+    Schedule: {},
     Motor: {
         "constant": 186.0,
         "time_constant": 1.26e-3,

@@ -1,0 +1,144 @@
+"""Schedule: forces of a guide that follow a recorded channel, such as a voltage or a temperature.
+
+With the channel's value u behind a first-order lag, position x and velocity v of the joint:
+
+    F = coulomb·u·s + viscous·u·v + offset·u,
+
+where s, from −1 to 1, is dry friction of unit size: the direction of motion, after a reversal only
+once the joint has moved by the error of its measured position. The dampers of controllable fluids
+are of this kind [Spencer, Dyke, Sain and Carlson, J. Eng. Mech. 123(3), 1997].
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, NamedTuple
+
+import numpy as np
+
+from rigtwin.components.effect import Context, Guess, Kind, Scales, Starts
+from rigtwin.components.guide import slide
+from rigtwin.components.quantity import NONE, Quantity
+from rigtwin.numerics.arrays import Array
+from rigtwin.numerics.compiling import kernel
+from rigtwin.numerics.filters import low_pass
+
+SHARES = (0.02, 0.1, 0.4, -0.1)
+"""Shares of the motion's force at which a search starts, at the channel's largest value."""
+
+
+class Schedule(NamedTuple):
+    """Change of a guide's forces per unit of a recorded channel.
+
+    Units are those of a sliding joint; for a turning joint, read Nm for N.
+    """
+
+    coulomb: Annotated[float, Quantity("N per unit of the channel", -1e9, 1e9, NONE)] = 0.0
+    viscous: Annotated[float, Quantity("Ns/m per unit of the channel", -1e9, 1e9, NONE)] = 0.0
+    offset: Annotated[float, Quantity("N per unit of the channel", -1e9, 1e9, NONE)] = 0.0
+    lag: Annotated[float, Quantity("s", 0.0, 10.0, NONE)] = 0.0
+
+
+def follow(schedule: Schedule, level: Array, period: float) -> Array:
+    """Return the channel's value behind its lag, shape (ticks,).
+
+    Parameters
+    ----------
+    schedule
+        Schedule with the lag.
+    level
+        Recorded values of the channel, shape (ticks,).
+    period
+        Time from tick to tick, s.
+    """
+    return low_pass(level, schedule.lag, period) if schedule.lag > 0.0 else level
+
+
+def scheduled_force(schedule: Schedule, level: Array, motion: Array, spring: float) -> Array:
+    """Return the force that follows a channel, N, shape (ticks,).
+
+    Parameters
+    ----------
+    schedule
+        Change of the guide's forces per unit of the channel.
+    level
+        Values of the channel behind its lag, shape (ticks,).
+    motion
+        Position, velocity and acceleration of the joint, shape (3, ticks).
+    spring
+        Inverse of the distance over which dry friction builds up after a reversal, 1/m.
+    """
+    force = schedule.viscous * level * motion[1] + schedule.offset * level
+    if schedule.coulomb != 0.0:
+        direction = np.zeros(motion.shape[1])
+        find_direction(motion[0], spring, direction)
+        force = force + schedule.coulomb * level * direction
+    return np.asarray(force)
+
+
+@kernel
+def find_direction(position: Array, spring: float, out: Array) -> None:
+    """Compute dry friction of unit size along a prescribed motion.
+
+    Parameters
+    ----------
+    position
+        Position of the joint, m, shape (ticks,).
+    spring
+        Inverse of the distance over which friction builds up after a reversal, 1/m.
+    out
+        Direction from −1 to 1, written, shape (ticks,).
+    """
+    slider = position[0]
+    for tick in range(len(position)):
+        out[tick], moved = slide(position[tick] - slider, 0.0, spring, 1.0, 1.0)
+        slider += moved
+
+
+def _per_channel(size: str) -> Guess:
+    """Return starts of a force per unit of the channel: `size` names the scale of the force."""
+
+    def guess(context: Context) -> Starts:
+        scales: Scales = context.scales
+        force = scales.force / (scales.speed if size == "damping" else 1.0)
+        unit = force / max(context.swing.largest[0], 1e-300)
+        return Starts.single([share * unit for share in SHARES], 0.005 * unit)
+
+    return guess
+
+
+def _lag(context: Context) -> Starts:
+    period = context.scales.period
+    times = sorted({2.0 * period, 8.0 * period, 0.01 * context.scales.time})
+    return Starts.single(times, 0.5 * period)
+
+
+KINDS = (
+    Kind(
+        "coulomb",
+        "proportional Coulomb friction",
+        ("coulomb",),
+        "dry friction that grows with the recorded channel",
+        {Schedule: _per_channel("force")},
+    ),
+    Kind(
+        "viscous",
+        "proportional viscous friction",
+        ("viscous",),
+        "viscous friction that grows with the recorded channel",
+        {Schedule: _per_channel("damping")},
+    ),
+    Kind(
+        "offset",
+        "proportional force",
+        ("offset",),
+        "a force that grows with the recorded channel, whichever way the joint moves",
+        {Schedule: _per_channel("force")},
+    ),
+    Kind(
+        "lag",
+        "lag of its force",
+        ("lag",),
+        "the force follows the recorded channel late",
+        {Schedule: _lag},
+    ),
+)
