@@ -28,7 +28,7 @@ from controllers.linear_law import LinearLaw
 Array = NDArray[np.float64]
 
 
-class Actuator(NamedTuple):
+class ActuatorDynamics(NamedTuple):
     """Continuous model from command to position, with a gain of about 1.
 
     Attributes
@@ -71,12 +71,12 @@ class Weights(NamedTuple):
     state_noise: float = 1e-5
 
 
-def first_order(lag: float, delay: float) -> Actuator:
+def first_order(lag: float, delay: float) -> ActuatorDynamics:
     """Return an actuator of unit gain with a lag and a delay, s, such as a diagnosis reports."""
-    return Actuator(np.array([[-1.0 / lag]]), np.array([1.0 / lag]), np.array([1.0]), delay)
+    return ActuatorDynamics(np.array([[-1.0 / lag]]), np.array([1.0 / lag]), np.array([1.0]), delay)
 
 
-def sampled_actuator(actuator: Actuator, period: float) -> tuple[Array, Array, Array]:
+def sampled_actuator(actuator: ActuatorDynamics, period: float) -> tuple[Array, Array, Array]:
     """Return A, B and C at a period, s, with the command held.
 
     Delayed commands are additional states. A delay of a fraction of a tick is interpolated.
@@ -103,7 +103,7 @@ def sampled_actuator(actuator: Actuator, period: float) -> tuple[Array, Array, A
     return a, b, c
 
 
-def kalman_inverse(actuator: Actuator, period: float, weights: Weights) -> LinearLaw:
+def kalman_inverse(actuator: ActuatorDynamics, period: float, weights: Weights) -> LinearLaw:
     """Return the law for an actuator, a period, s, and weights."""
     a, b, c = sampled_actuator(_balanced(actuator), period)
     # Derivatives in units of 50 periods: in SI units they would differ by factors of T^m.
@@ -136,7 +136,7 @@ def kalman_inverse(actuator: Actuator, period: float, weights: Weights) -> Linea
     return LinearLaw(closed @ corrected, closed @ gain, -regulator @ corrected, -regulator @ gain)
 
 
-def _balanced(actuator: Actuator) -> Actuator:
+def _balanced(actuator: ActuatorDynamics) -> ActuatorDynamics:
     """Return the same actuator in balanced states.
 
     The states of a companion form differ by decades, which makes the Riccati equations fail.
@@ -145,7 +145,7 @@ def _balanced(actuator: Actuator) -> Actuator:
     b = np.asarray(np.linalg.solve(change, actuator.b), dtype=np.float64)
     c = actuator.c @ change
     size = math.sqrt(float(np.linalg.norm(b) / np.linalg.norm(c)))
-    return Actuator(a, b / size, c * size, actuator.delay)
+    return ActuatorDynamics(a, b / size, c * size, actuator.delay)
 
 
 def _cost(

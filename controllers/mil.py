@@ -53,7 +53,7 @@ class Controller(NamedTuple):
     period: float
 
 
-class State(NamedTuple):
+class MilState(NamedTuple):
     """Memory of the controller between ticks, in m, m/s and N.
 
     Numbers stand first, then tuples of numbers, whose lengths the defaults give. The memory of the
@@ -77,7 +77,7 @@ class State(NamedTuple):
     plate: Array = at_rest(plate(Settings(), 1.0))
 
 
-def _lay_out(state: State) -> dict[str, slice]:
+def _lay_out(state: MilState) -> dict[str, slice]:
     """Return the place of every field in a packed state."""
     places, first = {}, 0
     for name, value in zip(state._fields[:-1], state[:-1], strict=True):
@@ -86,8 +86,8 @@ def _lay_out(state: State) -> dict[str, slice]:
     return places
 
 
-PLACES = _lay_out(State())
-SIZE = PLACES[State._fields[-2]].stop
+PLACES = _lay_out(MilState())
+SIZE = PLACES[MilState._fields[-2]].stop
 """Length of a packed state, without the memory of the plate."""
 # Compiled code supports slices that are constants of the module, but no dictionary of them.
 _MODAL, _RATES, _COMPENSATION = PLACES["modal"], PLACES["modal_rates"], PLACES["compensation"]
@@ -103,10 +103,10 @@ def controller(settings: Settings, period: float) -> Controller:
     return Controller(settings, modes(settings, period), plate(settings, period), period)
 
 
-def initial_state(controller: Controller) -> State:
+def initial_state(controller: Controller) -> MilState:
     """Return the state before the first tick: the structure model at rest at `start`."""
     settings = controller.settings
-    return State(
+    return MilState(
         structure_position=settings.start,
         modal=at_start(settings, controller.modes),
         plate=at_rest(controller.plate),
@@ -114,7 +114,7 @@ def initial_state(controller: Controller) -> State:
 
 
 @compilable
-def packed(state: State) -> tuple[float, ...]:
+def packed(state: MilState) -> tuple[float, ...]:
     """Return a state as plain numbers, without the memory of the plate."""
     numbers: Any = state[_NUMBERS]
     memory = state.compensation[:] + state.velocities + state.errors
@@ -122,17 +122,17 @@ def packed(state: State) -> tuple[float, ...]:
 
 
 @compilable
-def unpacked(values: tuple[float, ...], plate: Array) -> State:
+def unpacked(values: tuple[float, ...], plate: Array) -> MilState:
     """Return the state of `SIZE` plain numbers and of the memory of the plate's compensator."""
     numbers: Any = values[_NUMBERS]
     compensation = Compensation(*values[_COMPENSATION])
     tuples = (values[_MODAL], values[_RATES], compensation, values[_VELOCITIES], values[_ERRORS])
-    return State(*(numbers + tuples + (plate,)))
+    return MilState(*(numbers + tuples + (plate,)))
 
 
 @compilable
 def _filter_measurements(
-    controller: Controller, state: State, measured: Measurements, demand: Demand
+    controller: Controller, state: MilState, measured: Measurements, demand: Demand
 ) -> tuple[float, float, float, float]:
     """Return the raw travel, m, and filtered travel, m, velocity, m/s, and force, N."""
     settings, period = controller.settings, controller.period
@@ -157,10 +157,10 @@ def _filter_measurements(
 @compilable
 def update(
     controller: Controller,
-    state: State,
+    state: MilState,
     measured: Measurements,
     demand: Demand,
-) -> tuple[State, Commands]:
+) -> tuple[MilState, Commands]:
     """Return the state and the commands after one tick.
 
     The order is: filters, suspension model and skyhook, structure model, delay compensation of its
@@ -213,7 +213,7 @@ def update(
     added = compensation.added
     integral, voltage = force_loop(settings, state.integral, demanded, force, added, period)
     compensation = advance_motor_model(compensation, MOTOR_CONSTANT * voltage, period)
-    next_state = State(
+    next_state = MilState(
         sample=sample,
         travel=travel,
         velocity=velocity,

@@ -17,7 +17,7 @@ from controllers.closed_loop import ClosedLoop, transfer, with_lag
 from controllers.compiled import compilable
 from controllers.forward_prediction import forward_prediction
 from controllers.inverse_model import inverse_coefficients
-from controllers.kalman_inverse import Actuator, Weights, kalman_inverse
+from controllers.kalman_inverse import ActuatorDynamics, Weights, kalman_inverse
 from controllers.lag_compensation import lag_compensation
 from controllers.linear_law import LinearLaw, step_linear
 from controllers.settings import PlateCompensator, Settings
@@ -98,7 +98,7 @@ def _law(
         if kind == PlateCompensator.LAG:
             return lag_compensation(delay, period)
         return forward_prediction(delay, period)
-    actuator = Actuator(*with_lag(loop), loop.delay)
+    actuator = ActuatorDynamics(*with_lag(loop), loop.delay)
     if np.max(np.linalg.eigvals(actuator.a).real) >= 0.0:
         raise ValueError(
             "controller.plate_a0 to plate_a3 describe a cylinder that is not stable by itself"

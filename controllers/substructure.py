@@ -15,7 +15,7 @@ from controllers.settings import PlateCompensator, Settings
 from controllers.signals import Commands, Demand, Measurements
 
 
-class Model(Protocol):
+class SubstructureModel(Protocol):
     """Structure model that returns the position of its plate at the next tick."""
 
     def advance(self, force: float, period: float) -> float:
@@ -44,7 +44,7 @@ class Substructured:
         self,
         settings: Settings,
         period: float,
-        model: Model | Callable[[float, float], float],
+        model: SubstructureModel | Callable[[float, float], float],
         law: LinearLaw | None = None,
     ) -> None:
         # The structure of the settings is simulated but unused: its plate needs no compensation.

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from referee.arm_cases import MACHINES, ArmCase, draw_arm, record_arm
-from referee.score import Row, names, share_of
+from referee.score import ScoreRow, names, share_of
 from referee.wild_cases import WildData
 from referee.withheld import Question, Withheld, check_machines, score_lines, seconds_row
 from rigtwin.studies.sweep import Workers
@@ -64,7 +64,7 @@ def _weigh_payloads(result: ArmResult) -> Iterator[float]:
                     yield abs(effect["parameters"]["payload"]["value"] - mass) / mass
 
 
-def arm_rows(result: ArmResult) -> list[Row]:
+def arm_rows(result: ArmResult) -> list[ScoreRow]:
     """Return every measure of the score."""
     pairs = list(zip(result.cases, result.answers, strict=True))
 
@@ -91,7 +91,7 @@ def arm_rows(result: ArmResult) -> list[Row]:
             "none set",
         ),
         share_of("a wrong name", [is_wrong(*p) for p in pairs], "<= 5 %"),
-        Row("mass of a payload, error, median / largest", mass_errors, "<= 3 %"),
+        ScoreRow("mass of a payload, error, median / largest", mass_errors, "<= 3 %"),
         seconds_row(result.answers),
     ]
 

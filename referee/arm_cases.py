@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from referee.arm_truth import Arm, Array, Link, Resistance, Travel, add_ball, motor_forces
+from referee.arm_truth import Arm, Array, JointTravel, Link, Resistance, add_ball, motor_forces
 
 DESCRIPTIONS = Path(__file__).parent / "machines"
 MACHINES: Mapping[str, str] = {
@@ -298,7 +298,7 @@ def record_arm(case: ArmCase, again: int = 0) -> ArmTest:
     return ArmTest({"/sensor": sensors}, PERIOD, defective.magnitudes)
 
 
-def draw_travel(machine: str, random: np.random.Generator) -> Travel:
+def draw_travel(machine: str, random: np.random.Generator) -> JointTravel:
     """Draw a motion of all joints, every one a sum of sines."""
     time = np.arange(round(SECONDS / PERIOD)) * PERIOD
     joints = []
@@ -319,7 +319,7 @@ def draw_travel(machine: str, random: np.random.Generator) -> Travel:
                 -np.sum(size * rate**2 * np.sin(phase_angle), axis=0),
             ]
         )
-    return Travel(*np.stack(joints, axis=1))
+    return JointTravel(*np.stack(joints, axis=1))
 
 
 def _spread(random: np.random.Generator, low: float, high: float) -> float:
@@ -367,7 +367,9 @@ def _change(
     return changed, changed.rotor
 
 
-def _unmodelled_force(word: str, joint: int, travel: Travel, usual: Array, size: float) -> Array:
+def _unmodelled_force(
+    word: str, joint: int, travel: JointTravel, usual: Array, size: float
+) -> Array:
     """Return a force whose form the library does not have, N or Nm, shape (ticks,).
 
     usual: force of the joint without it; size: magnitude of the additional force.

@@ -89,7 +89,7 @@ class Arm(NamedTuple):
     belt: Resistance = Resistance()
 
 
-class Travel(NamedTuple):
+class JointTravel(NamedTuple):
     """Motion of the joints: position, speed and acceleration, each of shape (joints, ticks)."""
 
     position: Array
@@ -116,7 +116,7 @@ def add_ball(link: Link, mass: float, along: float, across: float, radius: float
 
 
 def link_forces(
-    links: Sequence[Link], point_acceleration: Array, travel: Travel
+    links: Sequence[Link], point_acceleration: Array, travel: JointTravel
 ) -> tuple[Array, Array]:
     """Return the forces on links that hang from a point.
 
@@ -182,7 +182,7 @@ def resisting_force(
     return force + resistance.spring * position + resistance.rotor * acceleration
 
 
-def motor_forces(arm: Arm, travel: Travel) -> Array:
+def motor_forces(arm: Arm, travel: JointTravel) -> Array:
     """Return the forces of the motors of an arm that moves as prescribed.
 
     Parameters
@@ -200,7 +200,7 @@ def motor_forces(arm: Arm, travel: Travel) -> Array:
     point_acceleration, hinges = np.zeros((2, travel.position.shape[1])), travel
     if arm.cart is not None:
         point_acceleration[0] = travel.acceleration[0]
-        hinges = Travel(*(each[1:] for each in travel))
+        hinges = JointTravel(*(each[1:] for each in travel))
     forces, reaction = link_forces(arm.links, point_acceleration, hinges)
     if arm.cart is not None:
         forces = np.concatenate([[reaction[0] + arm.cart * point_acceleration[0]], forces])

@@ -17,7 +17,7 @@ from controllers import (
     unpacked,
     update,
 )
-from referee.reference_plant import Body, Truth, advance, at_rest, sample, true_values
+from referee.reference_plant import ReferenceBody, Truth, advance, at_rest, sample, true_values
 from referee.reference_rig import draw_noise
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.settings import Safety
@@ -30,7 +30,7 @@ from rigtwin.simulation.safety import LimitMemory, Trip, empty_memory_arrays, ju
 @kernel
 def _ticks(
     truth: Truth,
-    body: Body,
+    body: ReferenceBody,
     controlling: Controller,
     limits: Safety,
     watch: LimitMemory,

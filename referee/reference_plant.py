@@ -24,7 +24,7 @@ NEVER = 1e9
 """Value of a limit that is never reached."""
 
 
-class Slider(NamedTuple):
+class ReferenceSlider(NamedTuple):
     """Sliding part with dry and viscous friction.
 
     Attributes
@@ -55,7 +55,7 @@ class Slider(NamedTuple):
     drag: float = 0.0
 
 
-class Drive(NamedTuple):
+class CommandPath(NamedTuple):
     """Path of a command to its actuator.
 
     Attributes
@@ -177,7 +177,7 @@ class Truth(NamedTuple):
     """
 
     mass: float = 34.0
-    rail: Slider = Slider(50.0)
+    rail: ReferenceSlider = ReferenceSlider(50.0)
     tyre: float = 50_000.0
     tyre_damping: float = 0.0
     tyre_hardening: float = 0.0
@@ -185,13 +185,13 @@ class Truth(NamedTuple):
     relaxing_time: float = 0.05
     motor_constant: float = 186.0
     electrical_lag: float = 1.26e-3
-    motor: Slider = Slider(14.0)
+    motor: ReferenceSlider = ReferenceSlider(14.0)
     ripple: float = 0.0
     ripple_pitch: float = 0.03
     ripple_phase: float = 0.0
-    voltage: Drive = Drive()
-    ground: Drive = Drive()
-    structure: Drive = Drive()
+    voltage: CommandPath = CommandPath()
+    ground: CommandPath = CommandPath()
+    structure: CommandPath = CommandPath()
     ground_hydraulic: Hydraulic = Hydraulic()
     structure_hydraulic: Hydraulic = Hydraulic()
     ground_lvdt: Sensor = LVDT
@@ -205,7 +205,7 @@ class Truth(NamedTuple):
 
 
 @numba.njit(cache=True, nogil=True)
-def dry_bounds(slider: Slider, speed: float, position: float) -> tuple[float, float]:
+def dry_bounds(slider: ReferenceSlider, speed: float, position: float) -> tuple[float, float]:
     """Return the bounds of dry friction in positive and in negative direction, N.
 
     The size is F_c + F_p exp(−(|v|/v_s)^n), times the variation along the way.
@@ -327,7 +327,7 @@ def plate_under_load(
 
 @numba.njit(cache=True, nogil=True)
 def pass_command(
-    drive: Drive,
+    drive: CommandPath,
     memory: Array,
     history: Array,
     count: int,
@@ -463,7 +463,7 @@ def reading(
     return round(x / sensor.bit) * sensor.bit if sensor.bit > 0.0 else x
 
 
-class Body(NamedTuple):
+class ReferenceBody(NamedTuple):
     """State of the rig, changed in place.
 
     Attributes
@@ -525,13 +525,15 @@ the number of steps, and the pistons.
 
 
 @numba.njit(cache=True, nogil=True)
-def at_rest(truth: Truth, ground_command: float, structure_command: float, preload: float) -> Body:
+def at_rest(
+    truth: Truth, ground_command: float, structure_command: float, preload: float
+) -> ReferenceBody:
     """Return the state before the first tick.
 
     Everything rests, the commands, m, have been constant for a long time, and tyre and motor carry
     the preload, N.
     """
-    body = Body(
+    body = ReferenceBody(
         np.zeros(19),
         np.empty((3, 2048)),
         np.zeros((3, 3)),
@@ -558,7 +560,7 @@ def at_rest(truth: Truth, ground_command: float, structure_command: float, prelo
 
 
 @numba.njit(cache=True, nogil=True)
-def true_values(body: Body) -> tuple[float, float, float, float]:
+def true_values(body: ReferenceBody) -> tuple[float, float, float, float]:
     """Return the readings of ideal sensors: ground, structure and travel, m, and load cell, N."""
     motion = body.motion
     ground, structure = motion[0] + motion[10], motion[1] + motion[11]
@@ -566,7 +568,7 @@ def true_values(body: Body) -> tuple[float, float, float, float]:
 
 
 @numba.njit(cache=True, nogil=True)
-def sample(truth: Truth, body: Body, tick: int, noise: Array, out: Array) -> None:
+def sample(truth: Truth, body: ReferenceBody, tick: int, noise: Array, out: Array) -> None:
     """Write the samples of all sensors at a tick into `out`, shape (4,); noise: shape (4,)."""
     values = true_values(body)
     sensors = (truth.ground_lvdt, truth.structure_lvdt, truth.suspension_lvdt, truth.load_cell)
@@ -627,7 +629,7 @@ def bristle_force(
 
 
 @numba.njit(cache=True, nogil=True)
-def advance(truth: Truth, body: Body, commands: Array, time: float) -> None:
+def advance(truth: Truth, body: ReferenceBody, commands: Array, time: float) -> None:
     """Advance the rig by one tick.
 
     commands: ground, m, structure, m, force, N, which is ignored, and voltage, V, shape (4,); time:

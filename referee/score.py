@@ -21,7 +21,7 @@ VISIBLE = 1.1
 
 
 @dataclass(frozen=True)
-class Row:
+class ScoreRow:
     """One measure of a score.
 
     Attributes
@@ -50,12 +50,12 @@ def wilson(hits: int, count: int) -> tuple[float, float]:
     return middle - half, middle + half
 
 
-def share_of(measure: str, hits: Sequence[bool], goal: str) -> Row:
+def share_of(measure: str, hits: Sequence[bool], goal: str) -> ScoreRow:
     """Return the row of a share, with its interval."""
     if not len(hits):
-        return Row(measure, "no case", goal)
+        return ScoreRow(measure, "no case", goal)
     low, high = wilson(sum(hits), len(hits))
-    return Row(
+    return ScoreRow(
         measure,
         f"{sum(hits)} of {len(hits)} ({100 * sum(hits) / len(hits):.1f} %)",
         goal,
@@ -100,7 +100,7 @@ Pair = tuple[dict[str, Any], dict[str, Any]]
 """Entry of the key, and the answer to it."""
 
 
-def rows(result: Result) -> list[Row]:
+def rows(result: Result) -> list[ScoreRow]:
     """Return every measure of the score, in the order of the goals."""
     pairs = list(zip(result.key, result.answers, strict=True))
     # A defect below the noise of its test is a trace: naming it is neither expected nor wrong.
@@ -115,7 +115,9 @@ def rows(result: Result) -> list[Row]:
         share_of("false alarms on nulls", [a["verdict"] != "no gap" for a in null], "<= 2 in 60"),
         *_outside_rows([(k, a) for k, a in pairs if k["sort"] == "outside"]),
         *_pair_rows([(k, a) for k, a in pairs if k["sort"] == "pair"]),
-        Row("magnitude error, median / 90th percentile", _percentiles(errors), "<= 2 % / <= 12 %"),
+        ScoreRow(
+            "magnitude error, median / 90th percentile", _percentiles(errors), "<= 2 % / <= 12 %"
+        ),
         *_shrinkage_rows([a for _, a in pairs]),
         share_of(f"right when confidence >= {CONFIDENT}", _confident_hits(pairs), ">= 97 %"),
         share_of(
@@ -128,7 +130,7 @@ def rows(result: Result) -> list[Row]:
             [_is_settled(result.key[n], a) for n, a in result.settled.items()],
             "none set",
         ),
-        Row(
+        ScoreRow(
             "seconds a record in the check, median / largest",
             _span(seconds),
             "<= 15 s for 30 s alone",
@@ -137,7 +139,7 @@ def rows(result: Result) -> list[Row]:
     ]
 
 
-def _single_rows(single: Sequence[Pair], right: Sequence[bool]) -> list[Row]:
+def _single_rows(single: Sequence[Pair], right: Sequence[bool]) -> list[ScoreRow]:
     """Return the measures of material single effects; right: whether the first name is true."""
     named = [a["effects"][0] for _, a in single if a["effects"]]
     inside = [bool(a["effects"]) and truths(k)[0] in _class_of(a["effects"][0]) for k, a in single]
@@ -152,12 +154,12 @@ def _single_rows(single: Sequence[Pair], right: Sequence[bool]) -> list[Row]:
     return [
         share_of("top-1 right, material single effects", right, ">= 95 %"),
         share_of("truth inside the reported class", inside, ">= 97 %"),
-        Row("mean class size", f"{np.mean(sizes):.2f}" if sizes else "no case", "<= 1.3"),
+        ScoreRow("mean class size", f"{np.mean(sizes):.2f}" if sizes else "no case", "<= 1.3"),
         share_of("component right", component, ">= 97 %"),
     ]
 
 
-def _outside_rows(outside: Sequence[Pair]) -> list[Row]:
+def _outside_rows(outside: Sequence[Pair]) -> list[ScoreRow]:
     """Return the measures of effects that the library does not have."""
     flagged = [a["verdict"] in ("unknown", "partly explained") for _, a in outside]
     placed = [
@@ -170,7 +172,7 @@ def _outside_rows(outside: Sequence[Pair]) -> list[Row]:
     ]
 
 
-def _pair_rows(double: Sequence[Pair]) -> list[Row]:
+def _pair_rows(double: Sequence[Pair]) -> list[ScoreRow]:
     """Return the measures of two simultaneous effects."""
     complete = [set(truths(k)) <= set(names(a)) for k, a in double]
     wrong = [bool(set(names(a)) - set(truths(k))) for k, a in double]
@@ -180,18 +182,18 @@ def _pair_rows(double: Sequence[Pair]) -> list[Row]:
     ]
 
 
-def _shrinkage_rows(answers: Sequence[dict[str, Any]]) -> list[Row]:
+def _shrinkage_rows(answers: Sequence[dict[str, Any]]) -> list[ScoreRow]:
     """Return the measures of predicted and achieved shrinkage of the gap."""
     gaps = [a["gap"] for a in answers if a["gap"] and a["effects"] and a["gap"]["before"] > VISIBLE]
     deviations = [abs(g["shrinkage_predicted"] - g["shrinkage_held_out"]["value"]) for g in gaps]
     worse = sum(g["shrinkage_held_out"]["value"] < WORSE for g in gaps)
     return [
-        Row(
+        ScoreRow(
             "predicted - achieved shrinkage, median / 90th percentile",
             _plain(deviations),
             "<= 0.03 / <= 0.10",
         ),
-        Row("corrections that worsen held-out data by > 5 %", f"{worse} of {len(gaps)}", "0"),
+        ScoreRow("corrections that worsen held-out data by > 5 %", f"{worse} of {len(gaps)}", "0"),
     ]
 
 
@@ -212,7 +214,7 @@ def _is_settled(entry: dict[str, Any], answer: dict[str, Any]) -> bool:
     return alone and sure and set(names(answer)) == set(truths(entry))
 
 
-def _baselines(result: Result, single: list[Pair]) -> list[Row]:
+def _baselines(result: Result, single: list[Pair]) -> list[ScoreRow]:
     """Return the scores of two baselines: always the same name, and the black box."""
     rows_of_baselines = []
     counts = Counter(truths(k)[0] for k, _ in single)
@@ -220,7 +222,9 @@ def _baselines(result: Result, single: list[Pair]) -> list[Row]:
         name, hits = counts.most_common(1)[0]
         low, high = wilson(hits, len(single))
         value = f"{hits} of {len(single)} ({100 * hits / len(single):.1f} %)"
-        rows_of_baselines.append(Row(f"baseline, always {name}: top-1 right", value, "", low, high))
+        rows_of_baselines.append(
+            ScoreRow(f"baseline, always {name}: top-1 right", value, "", low, high)
+        )
     if result.crude:
         tried = [(result.key[number], name) for number, name in result.crude.items()]
         hits = [

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from referee.score import Row, names, share_of
+from referee.score import ScoreRow, names, share_of
 from referee.wild_cases import MACHINES, WildCase, draw_wild, record_wild
 from referee.withheld import Question, Withheld, check_machines, score_lines, seconds_row
 from rigtwin.studies.sweep import Workers
@@ -75,7 +75,7 @@ def reliability(named: Sequence[Named]) -> list[tuple[float, float, int]]:
     return bins
 
 
-def wild_rows(result: WildResult) -> list[Row]:
+def wild_rows(result: WildResult) -> list[ScoreRow]:
     """Return every measure of the score."""
     pairs = list(zip(result.cases, result.answers, strict=True))
     wrong = [bool(set(names(a)) - case.accepted) for case, a in pairs]

@@ -10,7 +10,7 @@ from typing import Any, Generic, TypeVar
 
 import numpy as np
 
-from referee.score import Row
+from referee.score import ScoreRow
 from referee.wild_cases import WildData
 from rigtwin.errors import RigtwinError
 from rigtwin.studies.sweep import Store, Workers, run_jobs
@@ -107,15 +107,15 @@ def answer_question(question: Question) -> dict[str, Any]:
         return {"verdict": "unusable", "effects": [], "sentence": str(error), "seconds": seconds}
 
 
-def seconds_row(answers: Sequence[dict[str, Any]]) -> Row:
+def seconds_row(answers: Sequence[dict[str, Any]]) -> ScoreRow:
     """Return the row of the computing time."""
     seconds = [answer["seconds"] for answer in answers]
-    return Row(
+    return ScoreRow(
         "seconds a case, median / largest", f"{np.median(seconds):.1f} / {max(seconds):.1f}", ""
     )
 
 
-def score_lines(seed: int, machines: int, rows: Sequence[Row]) -> list[str]:
+def score_lines(seed: int, machines: int, rows: Sequence[ScoreRow]) -> list[str]:
     """Return a score as text: a heading, and a line for each measure."""
     lines = [f"seed {seed}, {machines} machines", ""]
     for row in rows:

@@ -23,9 +23,9 @@ from referee.arm_cases import (
 from referee.arm_truth import (
     GRAVITY,
     Arm,
+    JointTravel,
     Link,
     Resistance,
-    Travel,
     add_ball,
     motor_forces,
     resisting_force,
@@ -47,7 +47,9 @@ def test_two_links_obey_lagranges_equations():
         )
     )
     resistances = (Resistance(rotor=arm.ROTORS[0]), Resistance(rotor=arm.ROTORS[1], viscous=0.1))
-    forces = motor_forces(Arm(None, links, resistances, Resistance(rotor=arm.BELT)), Travel(*moved))
+    forces = motor_forces(
+        Arm(None, links, resistances, Resistance(rotor=arm.BELT)), JointTravel(*moved)
+    )
     assert forces == pytest.approx(arm.torques(*moved), abs=1e-9)
 
 
@@ -71,7 +73,7 @@ def test_the_motors_work_equals_the_energy_lost_to_friction(machine):
     w = 2.0 * np.pi / 4.0 * np.arange(1, len(GUIDES[machine]) + 1)[:, None]
     position = 0.3 * np.sin(w * time)
     rate = np.asarray(0.3 * w * np.cos(w * time), float)
-    travel = Travel(position, rate, np.asarray(-0.3 * w**2 * np.sin(w * time), float))
+    travel = JointTravel(position, rate, np.asarray(-0.3 * w**2 * np.sin(w * time), float))
     whole = NOMINAL[machine]
     bare = whole._replace(
         resistances=tuple(Resistance() for _ in whole.resistances), belt=Resistance()

@@ -18,7 +18,7 @@ from controllers import (
     update,
 )
 from controllers.closed_loop import ClosedLoop, transfer, with_lag
-from controllers.kalman_inverse import Actuator, sampled_actuator
+from controllers.kalman_inverse import ActuatorDynamics, sampled_actuator
 from controllers.linear_law import pass_through, response
 from controllers.plate import cylinder_model, plate
 from experiments import find
@@ -99,7 +99,7 @@ def test_every_compensator_takes_the_delay_out_of_slow_motions(kind: PlateCompen
     loop = ClosedLoop(delay=0.004)
     settings = compensated(Configuration(), loop.delay).controller._replace(plate_compensator=kind)
     law = plate(settings, PERIOD).law
-    a, b, c = sampled_actuator(Actuator(*with_lag(loop), loop.delay), PERIOD)
+    a, b, c = sampled_actuator(ActuatorDynamics(*with_lag(loop), loop.delay), PERIOD)
     z = np.exp(2j * np.pi * 0.05 * PERIOD)
     cylinder = complex(c @ np.linalg.solve(z * np.eye(len(a)) - a, b))
     ahead, back = response(law, 0.05, PERIOD)

@@ -16,7 +16,7 @@ from rigtwin.description.configuration import Configuration
 from rigtwin.errors import RigtwinError
 from rigtwin.simulation.runner import simulate
 from rigtwin.simulation.safety import Trip
-from rigtwin.studies.actions import Actuators, Schedule
+from rigtwin.studies.actions import ActionSchedule, Actuators
 from rigtwin.studies.environment import Environment, Reward
 
 
@@ -266,7 +266,7 @@ def test_noise_on_actions_comes_of_the_seed():
 )
 def test_mistakes_in_actions_are_said(bounds, says):
     with pytest.raises(RigtwinError, match=says):
-        Schedule(bounds)
+        ActionSchedule(bounds)
 
 
 def test_mistakes_are_said():

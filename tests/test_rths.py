@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 
 import rigtwin
 from experiments.rths import hybrid_test
-from experiments.rths.actuator import GAIN, Plant, draw_plants, sampled, transfer
+from experiments.rths.actuator import GAIN, ActuatorPlant, draw_plants, sampled, transfer
 from experiments.rths.building import CASES, PERIOD, STIFFNESS, frequencies, move, whole_building
 from experiments.rths.compensators import COMPENSATORS, find_compensator
 from experiments.rths.criteria import delay, judge
@@ -49,7 +49,7 @@ def test_the_reference_agrees_with_an_independent_integrator():
 
 @pytest.mark.parametrize("frequency", [0.01, 3.6, 16.0, 38.0, 70.0])
 def test_the_sampled_plant_is_its_transfer_function_delayed_by_half_a_tick(frequency):
-    plant = Plant(beta1=430.0, a3=5.0)
+    plant = ActuatorPlant(beta1=430.0, a3=5.0)
     a, b = sampled(plant)
     z = np.exp(2j * np.pi * frequency * PERIOD)
     response = np.linalg.solve(z * np.eye(5) - a, b)[0]
@@ -77,7 +77,7 @@ def test_with_a_perfect_actuator_the_error_of_the_late_force_remains():
     criteria = ideal_test(CASES[1], ground_motion("elcentro"))
     assert criteria.j2 == 0.0
     assert 0.5 < criteria.j4 < 4.0
-    softer = Plant().specimen._replace(stiffness=1.19e6 - 1e5)
+    softer = ActuatorPlant().specimen._replace(stiffness=1.19e6 - 1e5)
     assert ideal_test(CASES[1], ground_motion("elcentro"), softer).j4 > criteria.j4
 
 

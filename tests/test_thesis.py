@@ -33,7 +33,7 @@ from experiments.thesis.identification import (
     thesis_force_loop,
 )
 from experiments.thesis.reproduction import Chapter, agreement_by_table, document, page, text
-from experiments.thesis.study import Conclusion, Drawing, Study, sheet
+from experiments.thesis.study import Conclusion, Drawing, ThesisStudy, sheet
 from experiments.thesis.work import run_studies
 from rigtwin.cli import main
 from rigtwin.errors import RigtwinError
@@ -108,7 +108,7 @@ def test_a_drawing_covers_the_figures_of_its_range():
     assert not covers_figure("Table 4.1 and 4.2", "Figure 4.2")
 
 
-def counting(fails: set[str], monkeypatch: pytest.MonkeyPatch) -> tuple[Study, list[str]]:
+def counting(fails: set[str], monkeypatch: pytest.MonkeyPatch) -> tuple[ThesisStudy, list[str]]:
     ran: list[str] = []
 
     def job(key: str):
@@ -129,7 +129,7 @@ def counting(fails: set[str], monkeypatch: pytest.MonkeyPatch) -> tuple[Study, l
         )
 
     jobs = lambda seeds: {f"job/{n}": job(f"job/{n}") for n in range(seeds)}  # noqa: E731
-    study = Study("counted", "Counted", "9", ("Table 3.1",), conclude, jobs)
+    study = ThesisStudy("counted", "Counted", "9", ("Table 3.1",), conclude, jobs)
     monkeypatch.setitem(STUDIES, "counted", study)
     return study, ran
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
+import pickle
+import sys
 from pathlib import Path
 
 import numba
@@ -9,6 +12,8 @@ import pytest
 from numba.core import config
 
 from rigtwin.numerics.verified_cache import VerifiedCache
+
+DIGEST = hashlib.sha256().digest_size
 
 
 def triple(x: float) -> float:
@@ -58,6 +63,23 @@ def test_whole_code_is_loaded_and_not_compiled(tmp_path, monkeypatch):
     before = [path.stat().st_mtime_ns for path in files(tmp_path, "nb*")]
     assert compiled(tmp_path, monkeypatch) == 6.0
     assert [path.stat().st_mtime_ns for path in files(tmp_path, "nb*")] == before
+
+
+class Renamed:
+    """Class that a later version of the program lacks."""
+
+
+def test_an_index_of_a_class_that_is_gone_is_not_read(tmp_path, monkeypatch):
+    compiled(tmp_path, monkeypatch)
+    (path,) = files(tmp_path, "nbi")
+    whole = path.read_bytes()[:-DIGEST]
+    version = pickle.loads(whole)
+    stamped = whole[len(pickle.dumps(version)) :]
+    stamp, _ = pickle.loads(stamped)
+    index = pickle.dumps(version) + pickle.dumps((stamp, {Renamed: "code"}))
+    path.write_bytes(index + hashlib.sha256(index).digest())
+    monkeypatch.delattr(sys.modules[__name__], "Renamed")
+    assert compiled(tmp_path, monkeypatch) == 6.0
 
 
 def test_a_full_disk_is_named_and_stops_nothing(tmp_path, monkeypatch, caplog):

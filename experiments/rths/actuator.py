@@ -26,7 +26,7 @@ Unscaled, the states differ by twelve decades and the matrix exponential loses i
 """
 
 
-class Plant(NamedTuple):
+class ActuatorPlant(NamedTuple):
     """Parameters of the actuator and its specimen.
 
     Attributes
@@ -49,19 +49,19 @@ SPREAD = (3.3, 3.3e3, 1.3, 5e4)
 """Standard deviations of β_1, 1/s, β_2, 1/s², a_3, 1/s, and k_e, N/m."""
 
 
-def draw_plants(count: int, seed: int = 1) -> list[Plant]:
+def draw_plants(count: int, seed: int = 1) -> list[ActuatorPlant]:
     """Return `count` plants: the nominal one first, then normally distributed ones.
 
     The same seed gives the same plants, whatever the count.
     """
     random = np.random.default_rng([seed, 7])
-    drawn = [Plant()]
+    drawn = [ActuatorPlant()]
     for deviation in random.standard_normal((count - 1, 4)) * np.array(SPREAD):
-        nominal = Plant()
+        nominal = ActuatorPlant()
         # The specimen's stiffness varies with the actuator: its true value is not measured either.
         stiffness = nominal.specimen.stiffness + float(deviation[3])
         drawn.append(
-            Plant(
+            ActuatorPlant(
                 nominal.beta1 + float(deviation[0]),
                 nominal.beta2 + float(deviation[1]),
                 nominal.a3 + float(deviation[2]),
@@ -71,7 +71,7 @@ def draw_plants(count: int, seed: int = 1) -> list[Plant]:
     return drawn
 
 
-def continuous(plant: Plant) -> tuple[Array, Array]:
+def continuous(plant: ActuatorPlant) -> tuple[Array, Array]:
     """Return the state-space matrices A, shape (5, 5), and B, shape (5,), in scaled units.
 
     The states are position (m), velocity (m/s), force (N), valve and valve rate, times `UNITS`.
@@ -90,7 +90,7 @@ def continuous(plant: Plant) -> tuple[Array, Array]:
     return a * UNITS[:, None] / UNITS[None, :], b * UNITS
 
 
-def sampled(plant: Plant) -> tuple[Array, Array]:
+def sampled(plant: ActuatorPlant) -> tuple[Array, Array]:
     """Return A, shape (5, 5), and B, shape (5,), sampled at `PERIOD` with the command held."""
     # Zero-order hold by one exponential: exp([[A, B], [0, 0]] T) = [[A_d, B_d], [0, 1]].
     a, b = continuous(plant)
@@ -100,7 +100,7 @@ def sampled(plant: Plant) -> tuple[Array, Array]:
     return np.ascontiguousarray(augmented[:5, :5]), np.ascontiguousarray(augmented[:5, 5])
 
 
-def transfer(plant: Plant) -> tuple[Sequence[float], Sequence[float]]:
+def transfer(plant: ActuatorPlant) -> tuple[Sequence[float], Sequence[float]]:
     """Return numerator and denominator of command → position, highest power of s first."""
     specimen = plant.specimen
     specimen_denominator = np.polymul(

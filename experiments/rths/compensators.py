@@ -9,11 +9,11 @@ import numpy as np
 from controllers.adaptive_law import adaptive_model, adaptive_time_series
 from controllers.forward_prediction import forward_prediction
 from controllers.inverse_model import inverse_coefficients, inverse_model
-from controllers.kalman_inverse import Actuator, Weights, kalman_inverse
+from controllers.kalman_inverse import ActuatorDynamics, Weights, kalman_inverse
 from controllers.lag_compensation import lag_compensation
 from controllers.linear_law import LinearLaw, pass_through
 from controllers.smith_predictor import smith_predictor
-from experiments.rths.actuator import Plant, continuous, transfer
+from experiments.rths.actuator import ActuatorPlant, continuous, transfer
 from experiments.rths.building import PERIOD
 from experiments.rths.hybrid_test import Law
 from rigtwin.errors import RigtwinError
@@ -45,19 +45,19 @@ def sample_controller() -> LinearLaw:
 
 def _nominal_delay() -> float:
     """Return the delay of the nominal plant at low frequency, s: the slope of its phase."""
-    below, above = transfer(Plant())
+    below, above = transfer(ActuatorPlant())
     return inverse_coefficients(below, above, 0.0, 1)[1]
 
 
 def nominal_inverse(order: int) -> list[float]:
     """Return the coefficients of the nominal plant's inverse, a polynomial of s of an order."""
-    return inverse_coefficients(*transfer(Plant()), 0.0, order)
+    return inverse_coefficients(*transfer(ActuatorPlant()), 0.0, order)
 
 
-def nominal_actuator() -> Actuator:
+def nominal_actuator() -> ActuatorDynamics:
     """Return the nominal plant as a state-space model of position."""
-    a, b = (np.asarray(part, dtype=np.float64) for part in continuous(Plant()))
-    return Actuator(a, b, np.eye(5)[0], 0.0)
+    a, b = (np.asarray(part, dtype=np.float64) for part in continuous(ActuatorPlant()))
+    return ActuatorDynamics(a, b, np.eye(5)[0], 0.0)
 
 
 KALMAN = Weights(

@@ -17,7 +17,7 @@ import numpy as np
 from controllers.adaptive_law import AdaptiveLaw, adaptive_memory, adaptive_model, step_adaptive
 from controllers.compiled import compilable
 from controllers.linear_law import LinearLaw, pass_through, step_linear
-from experiments.rths.actuator import UNITS, Plant, sampled
+from experiments.rths.actuator import UNITS, ActuatorPlant, sampled
 from experiments.rths.building import (
     PERIOD,
     BuildingCase,
@@ -104,7 +104,7 @@ def run_test(
     case: BuildingCase,
     ground: Array,
     law: Law,
-    plant: Plant | None = None,
+    plant: ActuatorPlant | None = None,
     noise: Noise = NONE,
     seed: int = 1,
 ) -> HybridTest:
@@ -139,7 +139,7 @@ def run_test(
         raise RigtwinError(
             f"ground motion of {len(ground)} ticks: expected at least {round(1.0 / PERIOD)}, 1 s"
         )
-    signals, last = _simulate(case, ground, law, plant or Plant(), noise, seed)
+    signals, last = _simulate(case, ground, law, plant or ActuatorPlant(), noise, seed)
     desired, measured = signals[:3].T[:last], signals[3][:last]
     reference = move(whole_building(case), ground)[:last]
     # Criteria of a truncated signal would flatter a loop that diverged.
@@ -157,7 +157,7 @@ def run_test(
 
 
 def _simulate(
-    case: BuildingCase, ground: Array, law: Law, plant: Plant, noise: Noise, seed: int
+    case: BuildingCase, ground: Array, law: Law, plant: ActuatorPlant, noise: Noise, seed: int
 ) -> tuple[Array, int]:
     """Return the signals of a test, shape (7, n), see `_loop`, and its length in ticks."""
     # The simulated part knows the nominal specimen alone; the true one may differ.

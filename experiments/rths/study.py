@@ -27,7 +27,7 @@ from experiments.rths.hybrid_test import (
     run_test,
 )
 from experiments.thesis.entry import Entry, number, statement
-from experiments.thesis.study import Conclusion, Job, Result, Study
+from experiments.thesis.study import Conclusion, Job, Result, ThesisStudy
 
 TABLE_3 = {
     1: ("4.6", "10.4", "11.5", "36.1", "19.0", "32.3", "32.4", "14.8", "14.8"),
@@ -175,7 +175,7 @@ def _summarise(result: Result) -> str:
     return words + (", beyond the actuator's limits" if outside else "")
 
 
-STUDY = Study(
+STUDY = ThesisStudy(
     "rths",
     "The benchmark of real-time hybrid simulation",
     "RTHS",

@@ -18,7 +18,7 @@ from controllers.adaptive_law import adaptive_model, adaptive_time_series
 from controllers.inverse_model import inverse_model
 from controllers.kalman_inverse import kalman_inverse
 from controllers.smith_predictor import smith_predictor
-from experiments.rths.actuator import Plant, draw_plants
+from experiments.rths.actuator import ActuatorPlant, draw_plants
 from experiments.rths.building import PERIOD, BuildingCase, find_case
 from experiments.rths.compensators import KALMAN, SMITH, nominal_actuator, nominal_inverse
 from experiments.rths.ground_motion import ground_motion
@@ -35,7 +35,7 @@ TUNED_SECONDS = 25.0
 
 
 @dataclass(frozen=True)
-class Knob:
+class TunedParameter:
     """A parameter to tune.
 
     Attributes
@@ -66,7 +66,7 @@ class Tunable:
         Function of the parameters, by name, that returns the law.
     """
 
-    knobs: tuple[Knob, ...]
+    knobs: tuple[TunedParameter, ...]
     make: Callable[..., Law]
 
     def start(self) -> np.ndarray:
@@ -88,31 +88,37 @@ def _weighed(**weights: float) -> Law:
 
 TUNABLE: Mapping[str, Tunable] = {
     "adaptive-model": Tunable(
-        (Knob("rate", 2.0, 0.02, 200.0), Knob("size", 1e-4, 1e-7, 1e-2)),
+        (TunedParameter("rate", 2.0, 0.02, 200.0), TunedParameter("size", 1e-4, 1e-7, 1e-2)),
         lambda rate, size: adaptive_model(nominal_inverse(3), PERIOD, rate=rate, size=size),
     ),
     "adaptive-time-series": Tunable(
-        (Knob("window", 1.0, 0.05, 50.0), Knob("hold", 1e-6, 1e-10, 1e-2)),
+        (TunedParameter("window", 1.0, 0.05, 50.0), TunedParameter("hold", 1e-6, 1e-10, 1e-2)),
         lambda window, hold: adaptive_time_series(
             nominal_inverse(2), PERIOD, window=window, hold=hold
         ),
     ),
     "inverse": Tunable(
-        (Knob("proportional", 1.0, 0.01, 10.0), Knob("integral", 40.0, 0.1, 500.0)),
+        (
+            TunedParameter("proportional", 1.0, 0.01, 10.0),
+            TunedParameter("integral", 40.0, 0.1, 500.0),
+        ),
         lambda proportional, integral: inverse_model(
             nominal_inverse(4), PERIOD, proportional=proportional, integral=integral
         ),
     ),
     "smith": Tunable(
-        (Knob("proportional", SMITH[-2], 0.01, 20.0), Knob("integral", SMITH[-1], 0.1, 1000.0)),
+        (
+            TunedParameter("proportional", SMITH[-2], 0.01, 20.0),
+            TunedParameter("integral", SMITH[-1], 0.1, 1000.0),
+        ),
         lambda proportional, integral: smith_predictor(*SMITH[:-2], proportional, integral, PERIOD),
     ),
     "kalman-inverse": Tunable(
         (
-            Knob("effort", KALMAN.effort, 1e-8, 1e-1),
-            Knob("decay", KALMAN.decay, 0.1, 100.0),
-            Knob("sensor_noise", KALMAN.sensor_noise, 1e-8, 1e-3),
-            Knob("state_noise", KALMAN.state_noise, 1e-8, 1e-2),
+            TunedParameter("effort", KALMAN.effort, 1e-8, 1e-1),
+            TunedParameter("decay", KALMAN.decay, 0.1, 100.0),
+            TunedParameter("sensor_noise", KALMAN.sensor_noise, 1e-8, 1e-3),
+            TunedParameter("state_noise", KALMAN.state_noise, 1e-8, 1e-2),
         ),
         _weighed,
     ),
@@ -152,7 +158,7 @@ class TunedCompensator:
 class _TestSeries:
     """Hybrid tests of one building and earthquake on a set of plants."""
 
-    def __init__(self, case: BuildingCase, ground: Array, plants: Sequence[Plant]) -> None:
+    def __init__(self, case: BuildingCase, ground: Array, plants: Sequence[ActuatorPlant]) -> None:
         self._case, self._ground, self._plants, self.tests = case, ground, list(plants), 0
 
     def worst_tracking(self, law: Law) -> float:

@@ -11,8 +11,8 @@ from experiments.thesis.judges import Judge
 from experiments.thesis.loci import (
     Claim,
     LocusCase,
-    Panel,
-    Variation,
+    LocusFigure,
+    LocusVariation,
     of_damping_ratio,
     of_lag,
     of_natural_frequency,
@@ -54,7 +54,7 @@ def locus_case(
     model: str,
     number: int,
     title: str,
-    variation: Variation,
+    variation: LocusVariation,
     panels: Mapping[str, View],
     *claims: Claim,
 ) -> LocusCase:
@@ -75,7 +75,7 @@ def locus_case(
     *claims : Claim
         Statements of the thesis about the case.
     """
-    shown = tuple(Panel(name, view) for name, view in panels.items())
+    shown = tuple(LocusFigure(name, view) for name, view in panels.items())
     return LocusCase(model, f"case {number}, {title}", variation, shown, claims)
 
 

@@ -15,7 +15,7 @@ from experiments import find
 from experiments.thesis import ride
 from experiments.thesis.entry import Entry, band, digits, statement
 from experiments.thesis.ride import MEASURED, SHOWN_SEED
-from experiments.thesis.study import Conclusion, Drawing, Job, Result, Study, sheet, span
+from experiments.thesis.study import Conclusion, Drawing, Job, Result, ThesisStudy, sheet, span
 from experiments.thesis.trial import over_seeds, seeded, trial
 from rigtwin.description.configuration import Configuration
 from rigtwin.render.plot import SENSED
@@ -387,7 +387,7 @@ def conclude(results: Mapping[str, Result]) -> Conclusion:
     return Conclusion(_entries(by_key), drawings, remarks)
 
 
-STUDY = Study(
+STUDY = ThesisStudy(
     "beams",
     "Skyhook under a cross of elastic beams",
     "7 B",

@@ -18,10 +18,10 @@ from experiments.thesis import (
     validation,
     vehicles_stability,
 )
-from experiments.thesis.study import Study, span
+from experiments.thesis.study import ThesisStudy, span
 from rigtwin.errors import RigtwinError
 
-STUDIES: dict[str, Study] = {
+STUDIES: dict[str, ThesisStudy] = {
     module.STUDY.name: module.STUDY
     for module in (
         similitude,
@@ -37,7 +37,7 @@ STUDIES: dict[str, Study] = {
         beams,
     )
 }
-BENCHMARKS: dict[str, Study] = {rths.STUDY.name: rths.STUDY}
+BENCHMARKS: dict[str, ThesisStudy] = {rths.STUDY.name: rths.STUDY}
 """Studies of benchmarks other than the thesis. They run only if requested by name."""
 TABLES = (
     *("Table 2.1",),
@@ -58,7 +58,7 @@ NOTHING_TO_COMPUTE = {
 
 
 @dataclass(frozen=True)
-class Selection:
+class ThesisSelection:
     """Part of the thesis to reproduce.
 
     Attributes
@@ -69,11 +69,11 @@ class Selection:
         Table, figure or equation to restrict the studies to. None keeps all of them.
     """
 
-    studies: tuple[Study, ...]
+    studies: tuple[ThesisStudy, ...]
     where: str | None
 
 
-def select_studies(name: str | None) -> Selection:
+def select_studies(name: str | None) -> ThesisSelection:
     """Return the studies of a name.
 
     The name is a study, a chapter (`5`, `A`), a table, figure or equation (`table-5.1`,
@@ -81,21 +81,21 @@ def select_studies(name: str | None) -> Selection:
     studies, for an unknown name.
     """
     if name is None:
-        return Selection(tuple(STUDIES.values()), None)
+        return ThesisSelection(tuple(STUDIES.values()), None)
     if name in STUDIES:
-        return Selection((STUDIES[name],), None)
+        return ThesisSelection((STUDIES[name],), None)
     if name in BENCHMARKS:
-        return Selection((BENCHMARKS[name],), None)
+        return ThesisSelection((BENCHMARKS[name],), None)
     # Accept `5`, `chapter 5`, `Chapter-5` and `appendix A` alike.
     plain = name.strip().lower().removeprefix("chapter").removeprefix("appendix").strip(" -")
     chapter = tuple(study for study in STUDIES.values() if plain in study.chapter.lower().split())
     if chapter:
-        return Selection(chapter, None)
+        return ThesisSelection(chapter, None)
     wanted = " ".join(name.replace("-", " ").split()).lower()
     for study in STUDIES.values():
         for covered in study.covers:
             if covered.lower() == wanted:
-                return Selection((study,), covered)
+                return ThesisSelection((study,), covered)
     for table, reason in NOTHING_TO_COMPUTE.items():
         if table.lower() == wanted:
             raise RigtwinError(f"{table} {reason}")

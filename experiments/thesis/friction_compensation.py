@@ -22,7 +22,7 @@ from experiments.thesis.friction_tests import (
     run_timed_steps,
     variant_errors,
 )
-from experiments.thesis.study import Conclusion, Job, Result, Study, span
+from experiments.thesis.study import Conclusion, Job, Result, ThesisStudy, span
 from rigtwin.numerics.arrays import Array
 
 WITHIN = 1.5  # factor within which a computed error agrees with a printed one
@@ -350,7 +350,7 @@ def conclude(results: Mapping[str, Result]) -> Conclusion:
     return Conclusion(entries, drawings(results), remarks)
 
 
-STUDY = Study(
+STUDY = ThesisStudy(
     "friction-compensation",
     "Friction compensation of the force loop",
     "4",

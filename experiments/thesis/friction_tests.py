@@ -25,7 +25,7 @@ from experiments import find
 from experiments.experiment import time_of
 from experiments.thesis.identification import thesis_cylinder
 from experiments.thesis.study import Result
-from experiments.thesis.trial import Trial, trial
+from experiments.thesis.trial import ThesisTrial, trial
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.settings import Timing
 from rigtwin.numerics.arrays import Array
@@ -57,14 +57,14 @@ AFTER = 0.04
 """Time after a reversal within which the peak of a spike is searched, s."""
 
 
-def run_compensated(seed: int, **settings: object) -> Trial:
+def run_compensated(seed: int, **settings: object) -> ThesisTrial:
     """Run the road test of chapter 4 with some controller settings changed."""
     return trial(
         "friction-road", seed, lambda c: c._replace(controller=c.controller._replace(**settings))
     )
 
 
-def errors(test: Trial) -> dict[str, float]:
+def errors(test: ThesisTrial) -> dict[str, float]:
     """Return the force errors of a test, N.
 
     `tracking` is the rms of demanded minus true force, `numerical` that of ideal minus demanded
@@ -79,7 +79,7 @@ def errors(test: Trial) -> dict[str, float]:
     }
 
 
-def spikes(test: Trial) -> Array:
+def spikes(test: ThesisTrial) -> Array:
     """Return the size of the friction spike at every isolated reversal, N, shape (reversals,).
 
     A spike is the peak of the filtered force error in the new direction, minus the mean before the

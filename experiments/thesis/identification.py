@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from controllers import Mode, Settings
 from experiments.experiment import time_of
 from experiments.thesis.entry import Entry, factor, statement
-from experiments.thesis.study import Conclusion, Drawing, Job, Result, Study, sheet, span
+from experiments.thesis.study import Conclusion, Drawing, Job, Result, ThesisStudy, sheet, span
 from experiments.thesis.trial import seeded
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.settings import Safety, Timing
@@ -457,7 +457,7 @@ def conclude(results: Mapping[str, Result]) -> Conclusion:
     return Conclusion(_entries(results, frequencies), [bode, statics], [remark])
 
 
-STUDY = Study(
+STUDY = ThesisStudy(
     "identification",
     "Identification of actuators, tyre and rail",
     "6",

@@ -23,7 +23,7 @@ POINTS = 500
 
 
 @dataclass(frozen=True)
-class Variation:
+class LocusVariation:
     """A parameter swept from start to end.
 
     Attributes
@@ -43,13 +43,13 @@ class Variation:
     at: Callable[[float], Setting]
 
 
-def of_lag(ratio: float) -> Variation:
+def of_lag(ratio: float) -> LocusVariation:
     """Return a sweep of the lag τ from 1 ms to 1 s at a damping ratio of the sprung mass."""
     car = ARBITRARY._replace(suspension_damping=damping(ratio, ARBITRARY.suspension_stiffness))
-    return Variation("τ", "s", 1e-3, 1.0, lambda lag: Setting(car, lag))
+    return LocusVariation("τ", "s", 1e-3, 1.0, lambda lag: Setting(car, lag))
 
 
-def of_natural_frequency(ratio: float, lag: float, end: float) -> Variation:
+def of_natural_frequency(ratio: float, lag: float, end: float) -> LocusVariation:
     """Return a sweep of the suspension stiffness from 1 N/m to `end`.
 
     Mass and damping ratio stay constant, so the natural frequency √(k_s/m_s) varies alone.
@@ -61,15 +61,15 @@ def of_natural_frequency(ratio: float, lag: float, end: float) -> Variation:
         )
         return Setting(car, lag)
 
-    return Variation("k_s", "N/m", 1.0, end, at)
+    return LocusVariation("k_s", "N/m", 1.0, end, at)
 
 
-def of_damping_ratio(lag: float) -> Variation:
+def of_damping_ratio(lag: float) -> LocusVariation:
     """Return a sweep of k_s = m_s from 1 to 100 000 (N/m, kg).
 
     The natural frequency stays at 1 rad/s while the damping ratio falls from 50 to 0.0005.
     """
-    return Variation(
+    return LocusVariation(
         "k_s = m_s",
         "N/m, kg",
         1.0,
@@ -78,9 +78,9 @@ def of_damping_ratio(lag: float) -> Variation:
     )
 
 
-def of_tyre_stiffness(lag: float) -> Variation:
+def of_tyre_stiffness(lag: float) -> LocusVariation:
     """Return a sweep of the tyre stiffness from 0.01 to 100 000 N/m at a lag, s."""
-    return Variation(
+    return LocusVariation(
         "k_t",
         "N/m",
         0.01,
@@ -89,9 +89,9 @@ def of_tyre_stiffness(lag: float) -> Variation:
     )
 
 
-def of_wheel_mass(lag: float) -> Variation:
+def of_wheel_mass(lag: float) -> LocusVariation:
     """Return a sweep of the wheel's mass from 0.01 to 100 000 kg at a lag, s."""
-    return Variation(
+    return LocusVariation(
         "m_u", "kg", 0.01, 1e5, lambda mass: Setting(ARBITRARY._replace(unsprung_mass=mass), lag)
     )
 
@@ -127,7 +127,7 @@ class Claim:
 
 
 @dataclass(frozen=True)
-class Panel:
+class LocusFigure:
     """A figure of the thesis.
 
     Attributes
@@ -162,8 +162,8 @@ class LocusCase:
 
     model: str
     title: str
-    variation: Variation
-    panels: tuple[Panel, ...]
+    variation: LocusVariation
+    panels: tuple[LocusFigure, ...]
     claims: tuple[Claim, ...] = ()
 
     @property
@@ -190,7 +190,7 @@ class LocusCase:
 
 
 @cache
-def locus(model: str, variation: Variation) -> Locus:
+def locus(model: str, variation: LocusVariation) -> Locus:
     """Return the root locus of a model over a variation, in steps of equal ratio.
 
     Loci are cached, because several judges compare a locus with others.
@@ -213,7 +213,7 @@ def drawing(name: str, covers: str, caption: str, cases: Sequence[LocusCase]) ->
     return Drawing(name, covers, caption, figure)
 
 
-def _draw(axis: Axes, case: LocusCase, panel: Panel) -> None:
+def _draw(axis: Axes, case: LocusCase, panel: LocusFigure) -> None:
     """Draw one panel of a case."""
     axis.axhline(0.0, color="0.6", linewidth=0.6, zorder=0)
     axis.axvline(0.0, color="0.3", linewidth=0.8, zorder=0)

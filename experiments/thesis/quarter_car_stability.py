@@ -8,7 +8,7 @@ from typing import NamedTuple
 from experiments.thesis.entry import Entry, digits, statement
 from experiments.thesis.loci import (
     ARBITRARY,
-    Variation,
+    LocusVariation,
     locus,
     of_damping_ratio,
     of_natural_frequency,
@@ -21,7 +21,7 @@ from experiments.thesis.quarter_car_statements import (
     statements,
     structure_lag,
 )
-from experiments.thesis.study import Conclusion, Result, Study, span
+from experiments.thesis.study import Conclusion, Result, ThesisStudy, span
 from rigtwin.studies.stability.locus import BODY, WHEEL, Locus, mode
 from rigtwin.studies.stability.models import MODELS, poles
 from rigtwin.studies.stability.vehicle import QuarterCar
@@ -30,7 +30,7 @@ STRUCTURE_LAG = 0.06895
 """Lag of Tables 5.7 to 5.12, s. It is the critical lag of the first column of each table."""
 
 
-class Column(NamedTuple):
+class TableColumn(NamedTuple):
     """A column of a table.
 
     Attributes
@@ -52,42 +52,42 @@ class Column(NamedTuple):
 
 DAMPED = "−0.0276 and −0.0724: damping of the tyre stabilises suspension MIL as well"
 TABLE_5_6 = (
-    Column({}, "0.0000", "0.0000"),
-    Column({"tyre_stiffness": 600.0}, "0.0000", "0.0000"),
-    Column({"unsprung_mass": 60.0}, "0.0000", "0.0000"),
-    Column({"tyre_damping": 10.0}, "0.0000", "0.0000", DAMPED),
+    TableColumn({}, "0.0000", "0.0000"),
+    TableColumn({"tyre_stiffness": 600.0}, "0.0000", "0.0000"),
+    TableColumn({"unsprung_mass": 60.0}, "0.0000", "0.0000"),
+    TableColumn({"tyre_damping": 10.0}, "0.0000", "0.0000", DAMPED),
 )
 STRUCTURE_TABLES = {
     "Table 5.7": (
-        Column({}, "0.0000"),
-        Column({"suspension_stiffness": 600.0}, "0.0242"),
-        Column({"suspension_stiffness": 400.0}, "-0.0394"),
+        TableColumn({}, "0.0000"),
+        TableColumn({"suspension_stiffness": 600.0}, "0.0242"),
+        TableColumn({"suspension_stiffness": 400.0}, "-0.0394"),
     ),
     "Table 5.8": (
-        Column({}, "0.0000"),
-        Column({"suspension_damping": 200.0}, "-0.0487"),
-        Column({"suspension_damping": 50.0}, "0.0432"),
-        Column({"suspension_damping": 1000.0}, "0.0256"),
+        TableColumn({}, "0.0000"),
+        TableColumn({"suspension_damping": 200.0}, "-0.0487"),
+        TableColumn({"suspension_damping": 50.0}, "0.0432"),
+        TableColumn({"suspension_damping": 1000.0}, "0.0256"),
     ),
     "Table 5.9": (
-        Column({}, "0.0000"),
-        Column({"sprung_mass": 60.0}, "-0.0057"),
-        Column({"sprung_mass": 40.0}, "0.0087"),
+        TableColumn({}, "0.0000"),
+        TableColumn({"sprung_mass": 60.0}, "-0.0057"),
+        TableColumn({"sprung_mass": 40.0}, "0.0087"),
     ),
     "Table 5.10": (
-        Column({}, "0.0000"),
-        Column({"tyre_stiffness": 600.0}, "-0.0148"),
-        Column({"tyre_stiffness": 400.0}, "0.0112"),
+        TableColumn({}, "0.0000"),
+        TableColumn({"tyre_stiffness": 600.0}, "-0.0148"),
+        TableColumn({"tyre_stiffness": 400.0}, "0.0112"),
     ),
     "Table 5.11": (
-        Column({}, "0.0000"),
-        Column({"unsprung_mass": 60.0}, "0.0043"),
-        Column({"unsprung_mass": 40.0}, "-0.0061"),
+        TableColumn({}, "0.0000"),
+        TableColumn({"unsprung_mass": 60.0}, "0.0043"),
+        TableColumn({"unsprung_mass": 40.0}, "-0.0061"),
     ),
     "Table 5.12": (
-        Column({}, "0.0000"),
-        Column({"tyre_damping": 10.0}, "-0.0299"),
-        Column({"tyre_damping": 100.0}, "-0.2926"),
+        TableColumn({}, "0.0000"),
+        TableColumn({"tyre_damping": 10.0}, "-0.0299"),
+        TableColumn({"tyre_damping": 100.0}, "-0.2926"),
     ),
 }
 TABLE_5_13 = {
@@ -192,7 +192,7 @@ def _ends(model: str, column: int) -> list[tuple[Locus, float]]:
     tyre, wheel = of_tyre_stiffness(SMALL_LAG), of_wheel_mass(SMALL_LAG)
     # True selects the end of a sweep. The damping ratio falls as its swept value rises, and so does
     # the unsprung frequency with the mass of the wheel.
-    chosen: tuple[tuple[tuple[Variation, bool], ...], ...] = (
+    chosen: tuple[tuple[tuple[LocusVariation, bool], ...], ...] = (
         ((frequency, False),),
         ((frequency, True),),
         ((ratio, True),),
@@ -215,7 +215,7 @@ REMARKS = (
     "(5.37) prints b_s u for k_t u and (5.38) k_t for k_s; the matrix (5.43) has both right.",
     "(5.55) and (5.56) are lost; they are derived anew from (5.49) to (5.54).",
 )
-STUDY = Study(
+STUDY = ThesisStudy(
     "quarter-car-stability",
     "stability of the quarter car with lags",
     "5",

@@ -13,8 +13,8 @@ from scipy.signal import butter, sosfiltfilt, welch
 from experiments import find
 from experiments.quarter_car import ROAD_CHAPTER_7
 from experiments.thesis.entry import Entry, factor, statement
-from experiments.thesis.study import Conclusion, Drawing, Job, Result, Study, sheet, span
-from experiments.thesis.trial import Trial, curves, errors, over_seeds, seeded, trial, vehicle
+from experiments.thesis.study import Conclusion, Drawing, Job, Result, ThesisStudy, sheet, span
+from experiments.thesis.trial import ThesisTrial, curves, errors, over_seeds, seeded, trial, vehicle
 from rigtwin.description.configuration import Configuration
 from rigtwin.numerics.arrays import Array
 from rigtwin.render.plot import ASKED, SENSED
@@ -56,7 +56,7 @@ def _run(
     return result
 
 
-def _observations(test: Trial) -> dict[str, float]:
+def _observations(test: ThesisTrial) -> dict[str, float]:
     """Return what the thesis reads off its plots: overshoot, force at rest, motion of the wheel."""
     period = test.configuration.timing.period
     early, late = slice(0, round(3 / period)), slice(round(12 / period), None)
@@ -98,7 +98,7 @@ def _body_frequency(position: Array, period: float) -> float:
     return float(1.0 / (period * (crossings[2] - crossings[0]))) if len(crossings) > 2 else math.nan
 
 
-def _spectra(test: Trial) -> dict[str, Array]:
+def _spectra(test: ThesisTrial) -> dict[str, Array]:
     """Return amplitude spectra up to 10 Hz, mm/√Hz (Fig. 6.48, 6.49)."""
     options = {"fs": 1 / test.configuration.timing.period, "nperseg": 8192, "detrend": "linear"}
     # Lines 1 to 81 of 8192 samples at 1 kHz are 0.12 to 9.9 Hz. The first 5 s hold the drop.
@@ -438,7 +438,7 @@ def conclude(results: Mapping[str, Result]) -> Conclusion:
     return Conclusion(_entries(results), drawings)
 
 
-STUDY = Study(
+STUDY = ThesisStudy(
     "quarter-car-tests",
     "Quarter car: drop and roads",
     "6",

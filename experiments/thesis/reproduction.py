@@ -10,9 +10,9 @@ from pathlib import Path
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from experiments.thesis.catalogue import NOTHING_TO_COMPUTE, TABLES, Selection, covers_figure
+from experiments.thesis.catalogue import NOTHING_TO_COMPUTE, TABLES, ThesisSelection, covers_figure
 from experiments.thesis.entry import Entry, count_agreeing
-from experiments.thesis.study import Conclusion, Drawing, Study
+from experiments.thesis.study import Conclusion, Drawing, ThesisStudy
 from rigtwin import __version__
 from rigtwin.console import table
 from rigtwin.errors import RigtwinError
@@ -22,7 +22,7 @@ from rigtwin.errors import RigtwinError
 class Chapter:
     """One study and its conclusion, restricted to the requested part."""
 
-    study: Study
+    study: ThesisStudy
     conclusion: Conclusion
 
     def groups(self) -> dict[str, list[Entry]]:
@@ -55,7 +55,7 @@ class TableAgreement:
     why: str
 
 
-def restrict(study: Study, conclusion: Conclusion, wanted: Selection) -> Chapter:
+def restrict(study: ThesisStudy, conclusion: Conclusion, wanted: ThesisSelection) -> Chapter:
     """Return a study with only the requested entries and drawings."""
     if wanted.where is None:
         return Chapter(study, conclusion)

@@ -14,7 +14,7 @@ from experiments.thesis.study import Drawing, Result, sheet
 from experiments.thesis.trial import (
     BODY,
     SHOWN,
-    Trial,
+    ThesisTrial,
     body_acceleration,
     curves,
     errors,
@@ -37,7 +37,7 @@ TAXIING = 10.0
 COLOUR = {"passive": COLOURS["other"], "semi-active": SENSED, "active": ASKED}
 
 
-def states_of(test: Trial) -> Array:
+def states_of(test: ThesisTrial) -> Array:
     """Return the packed state of the controller at every tick, shape (ticks, SIZE)."""
     demands = test.simulation.commands[:, :3]
     return states(
@@ -48,7 +48,7 @@ def states_of(test: Trial) -> Array:
     )
 
 
-def damping(test: Trial) -> Array:
+def damping(test: ThesisTrial) -> Array:
     """Return the coefficient of the semi-active damper at every tick, Ns/m, shape (ticks,)."""
     settings, packed = test.configuration.controller, states_of(test)
     # The controller uses the structure's velocity of the tick before.
@@ -61,7 +61,7 @@ def damping(test: Trial) -> Array:
     )
 
 
-def ride_measures(test: Trial) -> dict[str, Array | float]:
+def ride_measures(test: ThesisTrial) -> dict[str, Array | float]:
     """Return the measures of ride and road holding of a test.
 
     They are the rms acceleration of the body, m/s², of twin and ideal; the rms of travel and tyre
@@ -95,7 +95,7 @@ def ride_measures(test: Trial) -> dict[str, Array | float]:
     return result
 
 
-def job_result(test: Trial, seed: int) -> Result:
+def job_result(test: ThesisTrial, seed: int) -> Result:
     """Return the stored result of a test, with its curves for the drawn seed."""
     result = ride_measures(test)
     if seed == SHOWN_SEED:
@@ -112,12 +112,12 @@ def job_result(test: Trial, seed: int) -> Result:
     return result
 
 
-def _wing(test: Trial) -> Array:
+def _wing(test: ThesisTrial) -> Array:
     """Return the height of the beams' points above the centre, m, shape (ticks, points)."""
     return wing(test.configuration.controller, test.configuration.timing.period, states_of(test))
 
 
-def _damper(test: Trial) -> Array:
+def _damper(test: ThesisTrial) -> Array:
     """Return the demanded force without preload and spring, N, shape (ticks,)."""
     settings, packed = test.configuration.controller, states_of(test)
     return (

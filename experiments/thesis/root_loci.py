@@ -13,8 +13,8 @@ import numpy as np
 from experiments.thesis import appendix_a1, appendix_a2, appendix_a3
 from experiments.thesis.appendix_a import FILTER_LAG, PRINTED_LAG, TYRES, WHEELS
 from experiments.thesis.entry import Entry, digits, statement
-from experiments.thesis.loci import ARBITRARY, Variation, damping, drawing, of_damping_ratio
-from experiments.thesis.study import Conclusion, Result, Study, span
+from experiments.thesis.loci import ARBITRARY, LocusVariation, damping, drawing, of_damping_ratio
+from experiments.thesis.study import Conclusion, Result, ThesisStudy, span
 from rigtwin.studies.stability.critical import critical_lag
 from rigtwin.studies.stability.loop import LOOPS
 
@@ -93,7 +93,7 @@ def _ratio(table: str) -> Entry:
     )
 
 
-def _largest_critical(model: str, variation: Variation) -> float:
+def _largest_critical(model: str, variation: LocusVariation) -> float:
     """Return the largest critical lag over a sweep, s."""
     values = np.logspace(math.log10(variation.start), math.log10(variation.end), 36)
     critical_lags = [critical_lag(LOOPS[model](variation.at(float(value)).car)) for value in values]
@@ -133,7 +133,7 @@ REMARKS = (
     "Table A1.3 prints b_u for b_t, Table A3.4 is captioned Table "
     "A1.3, and §A2.2 calls cases 4 to 6 cases 3 to 5.",
 )
-STUDY = Study(
+STUDY = ThesisStudy(
     "root-loci",
     "root loci of the quarter car with lags",
     "A",

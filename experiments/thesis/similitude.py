@@ -14,7 +14,7 @@ import numpy as np
 from controllers.quantity import Quantity, fields
 from experiments.thesis.entry import Entry, digits, number, statement
 from experiments.thesis.landing import Landing, touch_down
-from experiments.thesis.study import Conclusion, Drawing, Result, Study, sheet
+from experiments.thesis.study import Conclusion, Drawing, Result, ThesisStudy, sheet
 from experiments.vehicles import VEHICLES, configuration
 from rigtwin.components import Cylinder, Motor
 from rigtwin.components.gas_spring import (
@@ -665,7 +665,7 @@ def conclude(results: Mapping[str, Result]) -> Conclusion:
     return Conclusion((*tables, *entries), (drawing,), tuple(remarks))
 
 
-STUDY = Study(
+STUDY = ThesisStudy(
     "similitude",
     "Dynamic similitude: a Boeing 707's landing gear at the rig's scale",
     "3",

@@ -13,7 +13,7 @@ from experiments.thesis.judges import Judge
 from experiments.thesis.loci import (
     Claim,
     LocusCase,
-    Panel,
+    LocusFigure,
     locus,
     of_damping_ratio,
     of_lag,
@@ -69,7 +69,7 @@ def _table_5_3() -> tuple[LocusCase, ...]:
                     "5.8", "critically damped", "moves away from the real axis", shapes.breaks_away
                 )
             )
-        panels = (Panel("5.7"), Panel("5.8", (-12.0, 2.0, 6.0)))
+        panels = (LocusFigure("5.7"), LocusFigure("5.8", (-12.0, 2.0, 6.0)))
         cases.append(
             LocusCase(MODEL, f"case {number}, ζ = {ratio:g}", LAGS[ratio], panels, tuple(claims))
         )
@@ -104,7 +104,7 @@ def _table_5_4() -> tuple[LocusCase, ...]:
                 MODEL,
                 f"case {number}, ζ = {ratio:g}, τ = 0.2 s",
                 SLOW[ratio],
-                (Panel(figure),),
+                (LocusFigure(figure),),
                 tuple(claims),
             )
         )
@@ -127,7 +127,7 @@ def _table_5_4() -> tuple[LocusCase, ...]:
                 MODEL,
                 f"case {number}, ζ = {ratio:g}, τ = 0.01 s",
                 QUICK[ratio],
-                (Panel(figure),),
+                (LocusFigure(figure),),
                 tuple(claims),
             )
         )
@@ -147,7 +147,7 @@ def _table_5_5() -> tuple[LocusCase, ...]:
             MODEL,
             "case 1, τ = 0.2 s",
             RATIOS[0.2],
-            (Panel("5.15"), Panel("5.16", low)),
+            (LocusFigure("5.15"), LocusFigure("5.16", low)),
             (
                 _claim("5.15", "high ratios", "vertical asymptote", shapes.asymptote("start")),
                 _claim("5.16", "low ratios", "unstable", judges.becomes_unstable(BODY)),
@@ -157,7 +157,7 @@ def _table_5_5() -> tuple[LocusCase, ...]:
             MODEL,
             "case 2, τ = 0.01 s",
             RATIOS[0.01],
-            (Panel("5.17"), Panel("5.18", low)),
+            (LocusFigure("5.17"), LocusFigure("5.18", low)),
             (
                 _claim(
                     "5.17", "high ratios", "asymptote further left, frequencies higher", further
@@ -175,7 +175,7 @@ def _table_5_5() -> tuple[LocusCase, ...]:
             MODEL,
             "case 3, τ = 0.001 s",
             RATIOS[0.001],
-            (Panel("5.19"), Panel("5.20", low)),
+            (LocusFigure("5.19"), LocusFigure("5.20", low)),
             (
                 _claim("5.19", "high ratios", "no asymptote", shapes.pairs_at_start(0, 0)),
                 _claim(

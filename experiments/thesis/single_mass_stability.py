@@ -12,7 +12,7 @@ from experiments.thesis.entry import Entry, digits
 from experiments.thesis.loci import ARBITRARY, damping, drawing
 from experiments.thesis.single_mass_formulas import FILTER, MASS, SOFT, bode, formulas, region
 from experiments.thesis.single_mass_loci import CASES
-from experiments.thesis.study import Conclusion, Result, Study, span
+from experiments.thesis.study import Conclusion, Result, ThesisStudy, span
 from rigtwin.studies.stability.models import poles, single_mass_structure, single_mass_suspension
 from rigtwin.studies.stability.vehicle import SingleMass
 
@@ -141,7 +141,7 @@ REMARKS = (
     "−1/τ, which no output sees; the table misprints it for "
     "τ = 0.5 s.",
 )
-STUDY = Study(
+STUDY = ThesisStudy(
     "single-mass-stability",
     "stability of the single mass with a lag",
     "5",

@@ -10,7 +10,7 @@ from experiments import find
 from experiments.thesis import ride
 from experiments.thesis.entry import Entry, band, digits, statement
 from experiments.thesis.ride import MEASURED, SHOWN_SEED
-from experiments.thesis.study import Conclusion, Drawing, Job, Result, Study, sheet, span
+from experiments.thesis.study import Conclusion, Drawing, Job, Result, ThesisStudy, sheet, span
 from experiments.thesis.trial import over_seeds, seeded, trial, vehicle
 from rigtwin.render.plot import ASKED, SENSED
 from rigtwin.render.style import COLOURS
@@ -230,7 +230,7 @@ def conclude(results: Mapping[str, Result]) -> Conclusion:
     return Conclusion(_entries(by_key), drawings, remarks)
 
 
-STUDY = Study(
+STUDY = ThesisStudy(
     "skyhook",
     "Skyhook under a point mass",
     "7 B",

@@ -64,7 +64,7 @@ def _no_jobs(seeds: int) -> Mapping[str, Job]:
 
 
 @dataclass(frozen=True)
-class Study:
+class ThesisStudy:
     """A study of one section of the thesis.
 
     Attributes

@@ -31,7 +31,7 @@ SHOWN = 20
 
 
 @dataclass(frozen=True)
-class Trial:
+class ThesisTrial:
     """A test on the twin, and the same test of the ideal system.
 
     Attributes
@@ -76,7 +76,7 @@ class Trial:
 
 def trial(
     name: str, seed: int, change: Callable[[Configuration], Configuration] = lambda c: c
-) -> Trial:
+) -> ThesisTrial:
     """Run a named experiment on the twin and on the ideal system.
 
     Parameters
@@ -109,10 +109,12 @@ def trial(
         )
     # The ideal system gets the commanded ground, so the ground cylinder's lag is not an error of
     # the suspension.
-    return Trial(configuration, simulated, simulate_ideal(configuration, simulated.commands[:, 0]))
+    return ThesisTrial(
+        configuration, simulated, simulate_ideal(configuration, simulated.commands[:, 0])
+    )
 
 
-def errors(test: Trial) -> dict[str, float]:
+def errors(test: ThesisTrial) -> dict[str, float]:
     """Return the rms errors of position, m, and force, N, and the ideal's rms about its mean.
 
     e1 is ideal minus demanded, e2 demanded minus true (§3.6); `total` is the rms of e1 + e2.
@@ -145,7 +147,7 @@ def vehicle(where: str, configuration: Configuration) -> list[Entry]:
     ]
 
 
-def curves(test: Trial) -> dict[str, Array]:
+def curves(test: ThesisTrial) -> dict[str, Array]:
     """Return the curves to draw, every `SHOWN`-th tick, in mm, N and s."""
     shown = slice(None, None, SHOWN)
     signals = {

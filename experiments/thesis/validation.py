@@ -9,8 +9,8 @@ from scipy.signal import csd, welch
 
 from experiments import find
 from experiments.thesis.entry import Entry, digits, factor, statement
-from experiments.thesis.study import Conclusion, Drawing, Job, Result, Study, sheet, span
-from experiments.thesis.trial import Trial, curves, errors, over_seeds, seeded, trial
+from experiments.thesis.study import Conclusion, Drawing, Job, Result, ThesisStudy, sheet, span
+from experiments.thesis.trial import ThesisTrial, curves, errors, over_seeds, seeded, trial
 from rigtwin.render.plot import ASKED, SENSED
 from rigtwin.render.style import COLOURS
 
@@ -53,7 +53,7 @@ def _run(name: str, seed: int) -> Result:
     return result  # type: ignore[return-value]
 
 
-def _acceleration_response(test: Trial) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _acceleration_response(test: ThesisTrial) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return frequencies up to 2 Hz, and the responses of twin and ideal there (Fig. 3.18).
 
     A response is the acceleration of the sprung mass per ground velocity, 1/s.
@@ -246,7 +246,7 @@ def conclude(results: Mapping[str, Result]) -> Conclusion:
     return Conclusion(_entries(results), drawings)
 
 
-STUDY = Study(
+STUDY = ThesisStudy(
     "validation",
     "Single mass: the rig against the ideal",
     "3",

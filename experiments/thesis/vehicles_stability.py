@@ -11,7 +11,7 @@ from scipy.linalg import expm
 
 from controllers import Settings
 from experiments.thesis.entry import Entry, digits, statement
-from experiments.thesis.study import Conclusion, Drawing, Result, Study, sheet, span
+from experiments.thesis.study import Conclusion, Drawing, Result, ThesisStudy, sheet, span
 from experiments.vehicles import VEHICLES
 from rigtwin.studies.stability.critical import Critical, critical_delay, critical_lag
 from rigtwin.studies.stability.loop import LOOPS
@@ -233,7 +233,7 @@ def conclude(results: Mapping[str, Result]) -> Conclusion:
     return Conclusion(_entries(cars), (_drawing(cars),), _remarks(cars))
 
 
-STUDY = Study(
+STUDY = ThesisStudy(
     "vehicles-stability",
     "the vehicles of Table 6.1 on the rig with four lags of 10 ms",
     "6",

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from experiments.thesis.study import Result, Study
+from experiments.thesis.study import Result, ThesisStudy
 from rigtwin.studies.sweep import Store, Workers, run_jobs
 
 
@@ -25,7 +25,7 @@ def run_job(request: tuple[str, int, str]) -> Result:
 
 
 def run_studies(
-    studies: Sequence[Study],
+    studies: Sequence[ThesisStudy],
     seeds: int,
     folder: Path,
     workers: Workers,

@@ -190,7 +190,7 @@ class Physics(ABC):
         machine
             Machine to simulate.
         test
-            What is run.
+            Test to run: experiment, settings, demands and effects.
         progress
             Called with the ticks done since its last call.
         """

@@ -9,8 +9,8 @@ from controllers import (
     Controller,
     Demand,
     Measurements,
+    MilState,
     Mode,
-    State,
     initial_state,
     update,
 )
@@ -42,7 +42,7 @@ SETTLING = 0.3
 NOT_HELD = ("following", "structure", "ground", "travel", "velocity", "wheel")
 """Causes after which cylinders are not held under pressure, because a cylinder may be at fault."""
 NOTHING = Commands(0.0, 0.0, 0.0, 0.0)
-Update = Callable[[Controller, State, Measurements, Demand], tuple[State, Commands]]
+Update = Callable[[Controller, MilState, Measurements, Demand], tuple[MilState, Commands]]
 
 
 class RigOperation:

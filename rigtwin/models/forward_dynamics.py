@@ -37,7 +37,7 @@ from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Component, Machine, ReplayOf, Row
 from rigtwin.models.basis import Passage, forms
 from rigtwin.models.following import follow_command
-from rigtwin.models.forward_motion import Contacts, Servos, State, StepInputs, advance
+from rigtwin.models.forward_motion import GuideContacts, Servos, State, StepInputs, advance
 from rigtwin.models.initial_state import InitialState, Seen, Sense
 from rigtwin.models.joint import ELASTIC, KEPT, LIGHTEST, SEED, SMALL, recover_motion
 from rigtwin.models.joint_motion import RIGID
@@ -324,7 +324,7 @@ class ForwardDynamicsModel(Model[Plant]):
             servos=self._serve(plant, commands),
         )
 
-    def _contacts(self, plant: Plant, forces: Array) -> Contacts:
+    def _contacts(self, plant: Plant, forces: Array) -> GuideContacts:
         """Return the guides as compiled code takes them.
 
         `forces` are those of the force actuators, N, shape (actuators, steps). They give the load
@@ -352,7 +352,7 @@ class ForwardDynamicsModel(Model[Plant]):
                 rigid if guide.compliance <= 0.0 else min(1.0 / guide.compliance, rigid)
             )
         size = self._bodies.coordinates
-        return Contacts(
+        return GuideContacts(
             guides=np.array(guides, float).reshape(len(guides), len(Guide._fields)),
             dry=np.array(dry, float).reshape(len(guides), len(Friction._fields)),
             along=np.array([self._along[name] for name in self._guides]).reshape(-1, size),
@@ -658,7 +658,9 @@ def _acts(guide: Guide) -> bool:
     return any(value for name, value in guide._asdict().items() if name not in SHAPES)
 
 
-def begin(contacts: Contacts, start: Array, prescribed: Array, held: np.ndarray, h: float) -> State:
+def begin(
+    contacts: GuideContacts, start: Array, prescribed: Array, held: np.ndarray, h: float
+) -> State:
     """Return the state of the machine before its first step.
 
     Parameters

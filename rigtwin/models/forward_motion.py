@@ -40,7 +40,7 @@ LAW = len(Push._fields)
 BACKLASH = Guide._fields.index("backlash")
 
 
-class Contacts(NamedTuple):
+class GuideContacts(NamedTuple):
     """Guides of the machine as compiled code takes them, one row for each guide.
 
     A guide's position is `zero + along · q`, with the machine's coordinates q.
@@ -188,7 +188,7 @@ def bear(
 @kernel
 def advance(
     bodies: Bodies,
-    contacts: Contacts,
+    contacts: GuideContacts,
     free: np.ndarray,
     held: np.ndarray,
     state: State,

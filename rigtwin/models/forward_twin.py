@@ -20,7 +20,7 @@ from rigtwin.models.forward_dynamics import ForwardDynamicsModel, begin
 from rigtwin.models.inputs import inputs_of_test
 from rigtwin.models.inverse_twin import SimulatedSignals
 from rigtwin.models.multibody import Multibody
-from rigtwin.models.stepped_twin import Drive, Sensing, SteppedTwin
+from rigtwin.models.stepped_twin import IdealSensor, SteppedActuator, SteppedTwin
 from rigtwin.numerics.arrays import Array, has_diverged
 
 
@@ -70,7 +70,7 @@ class ForwardDynamicsTwin(ForwardDynamicsModel):
             inputs=inputs,
             laws=[push_law(getattr(plant, name)) for name in self._servos],
             drives=[self._drive(plant, name, h) for name in outputs],
-            sensing=[Sensing(r, self._along[r.name], self._zero[r.name]) for r in sensors],
+            sensing=[IdealSensor(r, self._along[r.name], self._zero[r.name]) for r in sensors],
             h=h,
             steps=self._steps,
         )
@@ -110,13 +110,13 @@ class ForwardDynamicsTwin(ForwardDynamicsModel):
             out[:, :, tick] = stepped.step(command_values)
         return out, commands
 
-    def _drive(self, plant: Plant, name: str, h: float) -> Drive:
+    def _drive(self, plant: Plant, name: str, h: float) -> SteppedActuator:
         mover: ForceActuator | Servo = getattr(plant, name)
         model = actuator(mover, plant.computer, h)
         if isinstance(mover, Servo):
-            return Drive(model, 1.0, UNLIMITED, True, self._servos.index(name))
+            return SteppedActuator(model, 1.0, UNLIMITED, True, self._servos.index(name))
         limit = self._limit(plant, name)
-        return Drive(model, mover.constant, limit, False, self._pushers.index(name))
+        return SteppedActuator(model, mover.constant, limit, False, self._pushers.index(name))
 
     def list_sensors(self, plant: Plant) -> list[Row]:
         """Return the sensors of the joints and the quantity that each reads."""

@@ -301,8 +301,8 @@ class InverseDynamicsModel(Model[Plant]):
         return predicted
 
     def components(self) -> tuple[str, ...]:
-        own = (name for name in self._onto if name not in self._schedules)
-        return (*own, *(row.name for row in self.rows))
+        mechanical = (name for name in self._onto if name not in self._schedules)
+        return (*mechanical, *(row.name for row in self.rows))
 
     def _passage(self, component: str, plant: Plant) -> tuple[Kinematics, Array, Array]:
         """Return a component's motion, shape (3, ticks), its load and its force, N."""

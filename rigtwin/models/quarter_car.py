@@ -20,7 +20,7 @@ from rigtwin.components.sensors import apply_sensor
 from rigtwin.description.configuration import Configuration
 from rigtwin.models.basis import Passage, forms
 from rigtwin.models.model import Form, Model
-from rigtwin.models.quarter_car_motion import Plate, move_carriage, move_plate
+from rigtwin.models.quarter_car_motion import PlateMotion, move_carriage, move_plate
 from rigtwin.numerics.arrays import Array, clip_diverged
 from rigtwin.recording import Inputs
 from rigtwin.simulation.converters import sensors
@@ -101,7 +101,7 @@ class QuarterCarModel(Model[RigPlant]):
         )
         self._period, self._steps = configuration.timing.period, steps
         self._last: dict[tuple[object, ...], Array] = {}
-        self._plates: dict[tuple[object, ...], Plate] = {}
+        self._plates: dict[tuple[object, ...], PlateMotion] = {}
 
     @classmethod
     def of(cls, inputs: Inputs, configuration: Configuration, steps: int) -> QuarterCarModel:
@@ -149,7 +149,7 @@ class QuarterCarModel(Model[RigPlant]):
         commands: Array,
         start: float,
         position: float | None,
-    ) -> Plate:
+    ) -> PlateMotion:
         # Most candidates leave the cylinders as they are, so the plates' motions are remembered.
         # A plate's yielding depends on its load and is left to the carriage's motion.
         unloaded = cylinder._replace(compliance=0.0, yield_lag=0.0, zero_load=0.0)
@@ -209,13 +209,13 @@ class QuarterCarModel(Model[RigPlant]):
         )
         return clip_diverged(out)
 
-    def _displace(self, plate: Plate, shift: Array) -> Plate:
+    def _displace(self, plate: PlateMotion, shift: Array) -> PlateMotion:
         if not shift.any():
             return plate
         ticks = np.arange(len(shift) * self._steps + 1) / self._steps
         motion = np.interp(ticks, np.arange(len(shift)), shift)
         ahead = motion[np.arange(len(shift)) * self._steps + 1]
-        return Plate(plate.position + motion, plate.onward + ahead)
+        return PlateMotion(plate.position + motion, plate.onward + ahead)
 
     def predict_disturbed(self, plant: RigPlant, entry: str, amount: Array) -> Array:
         """Return the sensors' readings under a disturbance, shape (4, ticks).

@@ -35,17 +35,17 @@ from rigtwin.components.guide import breakaway
 from rigtwin.components.yielding import share_of_load, solve_yielding
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
-from rigtwin.simulation.plant import Contacts, contacts, stiffness_ratio
+from rigtwin.simulation.plant import RigContacts, contacts, stiffness_ratio
 
 
-class Plate(NamedTuple):
+class PlateMotion(NamedTuple):
     """Unloaded motion of a plate under its command."""
 
     position: Array  # Position at every step and one beyond, m, shape (steps·ticks + 1,).
     onward: Array  # Position one step after each tick under the old command, m, shape (ticks,).
 
 
-class Carriage(NamedTuple):
+class CarriageConstants(NamedTuple):
     """Constants of the carriage's equation of motion, except those of its contacts."""
 
     timestep: float  # Integration step, s.
@@ -68,7 +68,7 @@ def _plate(
     position: Array,
     onward: Array,
 ) -> None:
-    """Move a cylinder by its commands; write `position` and `onward` as in `Plate`."""
+    """Move a cylinder by its commands; write `position` and `onward` as in `PlateMotion`."""
     for tick in range(len(commands)):
         # `held.memory[3]` is the last conditioned command, which still acts at this tick.
         onward[tick] = next_position(model, state, held.memory[3])
@@ -86,7 +86,7 @@ def move_plate(
     at: float | None,
     timestep: float,
     steps: int,
-) -> Plate:
+) -> PlateMotion:
     """Move a cylinder by its commands, from rest.
 
     Parameters
@@ -111,7 +111,7 @@ def move_plate(
     """
     conditioning = actuator(cylinder, computer, timestep)
     held = hold(conditioning, start)
-    out = Plate(np.empty(len(commands) * steps + 1), np.empty(len(commands)))
+    out = PlateMotion(np.empty(len(commands) * steps + 1), np.empty(len(commands)))
     state = rest_state(cylinder, float(held.memory[3]) if at is None else at)
     _plate(
         model=discretise(cylinder, timestep),
@@ -207,8 +207,8 @@ def motor_friction(
 
 @kernel
 def _mechanics(
-    carriage: Carriage,
-    now: Contacts,
+    carriage: CarriageConstants,
+    now: RigContacts,
     motor_drive: Actuator,
     motor_command: ActuatorState,
     start: float,
@@ -370,7 +370,7 @@ def follow_plates(
     plant = plant._replace(ground_cylinder=rigid, structure_cylinder=rigid)
     return move_carriage(
         plant=plant,
-        plates=(Plate(ground, ground[1:]), Plate(structure, structure[1:])),
+        plates=(PlateMotion(ground, ground[1:]), PlateMotion(structure, structure[1:])),
         voltage=voltage,
         pushed=pushed,
         start=start,
@@ -381,10 +381,10 @@ def follow_plates(
     )
 
 
-def _arrange_carriage(plant: RigPlant, timestep: float) -> Carriage:
+def _arrange_carriage(plant: RigPlant, timestep: float) -> CarriageConstants:
     """Return the constants of the carriage's equation of motion."""
     motor: Motor = plant.motor
-    return Carriage(
+    return CarriageConstants(
         timestep=timestep,
         mass=plant.carriage.mass,
         rail_viscous=plant.rail.viscous,
@@ -398,7 +398,7 @@ def _arrange_carriage(plant: RigPlant, timestep: float) -> Carriage:
 
 def move_carriage(
     plant: RigPlant,
-    plates: tuple[Plate, Plate],
+    plates: tuple[PlateMotion, PlateMotion],
     voltage: Array,
     pushed: Array,
     start: float,

@@ -10,13 +10,13 @@ import numpy as np
 from rigtwin.components.conditioning import Actuator, ActuatorState, condition, hold
 from rigtwin.components.servo import Push, push
 from rigtwin.description.machine import Row
-from rigtwin.models.forward_motion import Contacts, State, StepInputs, advance
+from rigtwin.models.forward_motion import GuideContacts, State, StepInputs, advance
 from rigtwin.models.multibody import Bodies
 from rigtwin.numerics.arrays import Array
 
 
 @dataclass(frozen=True)
-class Drive:
+class SteppedActuator:
     """Actuator that is commanded tick by tick.
 
     Attributes
@@ -41,7 +41,7 @@ class Drive:
 
 
 @dataclass(frozen=True)
-class Sensing:
+class IdealSensor:
     """Ideal sensor of the coordinates.
 
     Attributes
@@ -92,14 +92,14 @@ class SteppedTwin:
         self,
         bodies: Bodies,
         owner: object,
-        contacts: Contacts,
+        contacts: GuideContacts,
         free: np.ndarray,
         held: np.ndarray,
         state: State,
         inputs: StepInputs,
         laws: Sequence[Push],
-        drives: Sequence[Drive],
-        sensing: Sequence[Sensing],
+        drives: Sequence[SteppedActuator],
+        sensing: Sequence[IdealSensor],
         h: float,
         steps: int,
     ) -> None:

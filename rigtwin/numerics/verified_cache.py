@@ -72,7 +72,11 @@ class _VerifiedFiles(IndexDataCacheFile):
             for file in [path, *path.parent.glob("*.nbc")]:
                 if file.name.startswith(f"{stem}."):
                     file.unlink(missing_ok=True)
-        return super()._load_index()
+        try:
+            return super()._load_index()
+        except (AttributeError, ImportError):
+            # The index names a class of an earlier version of the program.
+            return {}
 
     def _load_data(self, name: str) -> Any:
         path = Path(self._data_path(name))

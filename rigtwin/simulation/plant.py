@@ -34,7 +34,7 @@ from rigtwin.numerics.compiling import forward, integrate
 from rigtwin.simulation.mechanics import Handles, build, handles
 
 
-class Contacts(NamedTuple):
+class RigContacts(NamedTuple):
     """Forces of the mechanics that change with the motion, and their states."""
 
     changing: bool  # Whether anything but constant friction and a linear tyre acts.
@@ -78,10 +78,10 @@ class PlantState(NamedTuple):
     structure_command: ActuatorState
     motor_drive: Actuator
     motor_command: ActuatorState
-    contacts: Contacts
+    contacts: RigContacts
 
 
-def contacts(plant: RigPlant, carriage: float, travel: float, preload: float) -> Contacts:
+def contacts(plant: RigPlant, carriage: float, travel: float, preload: float) -> RigContacts:
     """Return a plant's contacts before anything moves.
 
     Parameters
@@ -102,7 +102,7 @@ def contacts(plant: RigPlant, carriage: float, travel: float, preload: float) ->
     compliances = plant.ground_cylinder.compliance, plant.structure_cylinder.compliance
     unloaded = unloaded_yield(plant)
     forces = (tyre.hardening, plant.motor.cogging, *compliances, plant.gas_spring.force)
-    return Contacts(
+    return RigContacts(
         changing=rail.changing or motor.changing or any(forces),
         rail=rail,
         rail_gap=gap_at(carriage),
@@ -267,7 +267,7 @@ def brace(mechanics: Handles) -> None:
 
 
 @compilable
-def stiffness_ratio(now: Contacts, deflection: float) -> float:
+def stiffness_ratio(now: RigContacts, deflection: float) -> float:
     """Return the tyre's secant stiffness at a deflection, m, as a factor on the nominal one."""
     if now.hardening == 0.0 or deflection <= 0.0:
         return 1.0
@@ -277,7 +277,7 @@ def stiffness_ratio(now: Contacts, deflection: float) -> float:
 
 
 @compilable
-def touch(mechanics: Handles, now: Contacts) -> None:
+def touch(mechanics: Handles, now: RigContacts) -> None:
     """Write dry friction, cogging and tyre stiffness of the current motion into the mechanics."""
     if not now.changing:
         return
@@ -302,7 +302,7 @@ def touch(mechanics: Handles, now: Contacts) -> None:
 
 @compilable
 def give_way(
-    mechanics: Handles, now: Contacts, ground: float, structure: float
+    mechanics: Handles, now: RigContacts, ground: float, structure: float
 ) -> tuple[float, float]:
     """Return the yield of ground and structure plate one timestep ahead, m.
 

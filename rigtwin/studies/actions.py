@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 from dm_env import specs
 
-from controllers import Commands, Controller, Demand, Measurements, Settings, State, update
+from controllers import Commands, Controller, Demand, Measurements, MilState, Settings, update
 from controllers.quantity import Quantity, fields
 from rigtwin.description.configuration import Configuration
 from rigtwin.errors import RigtwinError
@@ -29,11 +29,11 @@ class Actions(Protocol):
     def act(
         self,
         controlling: Controller,
-        state: State,
+        state: MilState,
         measured: Measurements,
         demand: Demand,
         action: Array,
-    ) -> tuple[State, Commands]:
+    ) -> tuple[MilState, Commands]:
         """Advance the controller by one tick under an action.
 
         Returns
@@ -44,7 +44,7 @@ class Actions(Protocol):
         ...
 
 
-class Schedule:
+class ActionSchedule:
     """Actions that set parameters of the running controller.
 
     Parameters
@@ -92,11 +92,11 @@ class Schedule:
     def act(
         self,
         controlling: Controller,
-        state: State,
+        state: MilState,
         measured: Measurements,
         demand: Demand,
         action: Array,
-    ) -> tuple[State, Commands]:
+    ) -> tuple[MilState, Commands]:
         # The replacement lasts for one tick: the next action starts from the same settings.
         changed = dict(zip(self.bounds, action.tolist(), strict=True))
         return update(
@@ -107,7 +107,7 @@ class Schedule:
         )
 
 
-def suspension(settings: Settings) -> Schedule:
+def suspension(settings: Settings) -> ActionSchedule:
     """Return the actions of a semi-active or active suspension.
 
     Parameters
@@ -128,7 +128,7 @@ def suspension(settings: Settings) -> Schedule:
         present, meaning = getattr(settings, name), fields(Settings)[name]
         assert isinstance(meaning, Quantity)
         bounds[name] = (low * present, min(high * present, meaning.high))
-    return Schedule(bounds)
+    return ActionSchedule(bounds)
 
 
 class Actuators:
@@ -150,11 +150,11 @@ class Actuators:
     def act(
         self,
         controlling: Controller,
-        state: State,
+        state: MilState,
         measured: Measurements,
         demand: Demand,
         action: Array,
-    ) -> tuple[State, Commands]:
+    ) -> tuple[MilState, Commands]:
         # The controller is still updated, because its filters are part of the observation. Its
         # commands are discarded.
         state, _ = update(controlling, state, measured, demand)

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from google.protobuf.message import Message
 
-from controllers import Commands, Controller, Demand, Measurements, State
+from controllers import Commands, Controller, Demand, Measurements, MilState
 from rigtwin.description.changes import override
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq.card import Card
@@ -295,8 +295,8 @@ def _make_failing_update(fault: InjectedFault, card: VirtualCard, healthy: Updat
     """Return an update function of a controller, or of its loop, that fails from a tick on."""
 
     def update(
-        controlling: Controller, state: State, measured: Measurements, demand: Demand
-    ) -> tuple[State, Commands]:
+        controlling: Controller, state: MilState, measured: Measurements, demand: Demand
+    ) -> tuple[MilState, Commands]:
         state, commands = healthy(controlling, state, measured, demand)
         if card.tick < fault.at:
             return state, commands

@@ -16,7 +16,7 @@ from multiprocessing.process import BaseProcess
 from multiprocessing.sharedctypes import Synchronized
 from pathlib import Path
 
-from controllers import Commands, Controller, Demand, Measurements, State
+from controllers import Commands, Controller, Demand, Measurements, MilState
 from controllers import update as healthy
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq.card import Card, connect
@@ -181,8 +181,8 @@ def _control(test: Test, path: Path, fault: InjectedFault, hung: Synchronized[fl
     ticks = 0
 
     def hang(
-        controlling: Controller, state: State, measured: Measurements, demand: Demand
-    ) -> tuple[State, Commands]:
+        controlling: Controller, state: MilState, measured: Measurements, demand: Demand
+    ) -> tuple[MilState, Commands]:
         nonlocal ticks
         ticks += 1
         if fault.kind.name == "controller hangs" and ticks > fault.at - BEFORE:

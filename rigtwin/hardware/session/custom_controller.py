@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from controllers import Commands, Controller, Demand, Measurements
-from controllers.mil import State
+from controllers.mil import MilState
 from rigtwin.description.configuration import Configuration
 from rigtwin.errors import RigtwinError
 from rigtwin.simulation.loop import Tick, TickController, check_commands
@@ -94,8 +94,8 @@ class CustomUpdate:
         self._tried = False
 
     def __call__(
-        self, _: Controller, state: State, measured: Measurements, demand: Demand
-    ) -> tuple[State, Commands]:
+        self, _: Controller, state: MilState, measured: Measurements, demand: Demand
+    ) -> tuple[MilState, Commands]:
         """Return the commands of a tick, and the state unchanged."""
         if not self._tried:
             self._tried = True
