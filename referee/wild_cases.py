@@ -56,7 +56,7 @@ ACCEPTED: Mapping[str, tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]]
     "steps": ((), (), ("quantisation",)),
     "eccentric": ((), (), ("gain",)),
     "ripple": (("cogging",), ("cogging",), ()),
-    "hardening": (("stiffness", "hardening"), (), ()),
+    "hardening": (("stiffness", "hardening", "position_force"), (), ()),
     "sag": ((), ("gain", "saturation"), ()),
     "late": ((), ("delay", "lag"), ("delay", "lag")),
     "lagging": ((), ("lag", "two_lags", "delay", "resonance"), ()),

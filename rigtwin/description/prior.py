@@ -25,6 +25,9 @@ class ModelPrior:
     error
         Size of the discrepancy that the model may have without any single cause, as a share of a
         signal's standard deviation. A larger rest points to an effect that has no name.
+    form
+        Deviation of the library's laws from the forms that they have in the machine, as a share of
+        the amplitude that they explain. A rare effect that explains less may only correct a form.
     implausible_scale
         Ratio of a measured signal to its prediction, or its inverse, from which the unit of the
         recording is wrong rather than the gain of the machine.
@@ -33,14 +36,15 @@ class ModelPrior:
     word: str
     even: float
     error: float
+    form: float
     implausible_scale: float
 
 
 PRIORS: Mapping[str, ModelPrior] = {
     prior.word: prior
     for prior in (
-        ModelPrior("known", 0.0, 0.02, 5.0),
-        ModelPrior("rough", 1.0, 0.5, inf),
+        ModelPrior("known", 0.0, 0.02, 0.03, 5.0),
+        ModelPrior("rough", 1.0, 0.5, 0.14, inf),
     )
 }
 """Word of the description → prior."""

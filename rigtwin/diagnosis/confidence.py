@@ -11,6 +11,11 @@ Therefore the probability is multiplied by 1 - m, where
 is the probability of a mimic, s the steepness of the logistic function L, rest the residual beyond
 noise, excess that beyond noise and declared error, and remains the share of the gap that is not
 closed. L is smooth, so that no small change of the data turns a confident answer around.
+
+A rare effect may also correct the form of a law: real friction and real springs differ a little
+from those of the library, and what differs resembles a small play, compliance or lag. Its mimic has
+at least the probability 1 / (1 + (a / form)^8), where a is the amplitude that the effect accounts
+for, relative to that of all effects, and form the deviation that is expected (`ModelPrior.form`).
 """
 
 from __future__ import annotations
@@ -23,6 +28,7 @@ from rigtwin.components import Effect
 from rigtwin.components.plant import Plant
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.posterior import HypothesisPosterior
+from rigtwin.diagnosis.prices import is_rare
 from rigtwin.diagnosis.scoring import Scored
 from rigtwin.diagnosis.support import Support
 from rigtwin.diagnosis.thresholds import Thresholds
@@ -30,13 +36,15 @@ from rigtwin.numerics.arrays import Array
 
 STEEPNESS = 4.0
 """Exponent s of the logistic functions."""
+FORM_STEEPNESS = 8.0
+"""Exponent of the logistic function of an effect that may correct the form of a law."""
 
 
-def _logistic(ratio: float) -> float:
-    """Return 1 / (1 + ratio^-s): 0 at 0, one half at 1."""
+def _logistic(ratio: float, steepness: float = STEEPNESS) -> float:
+    """Return 1 / (1 + ratio^-steepness): 0 at 0, one half at 1."""
     if ratio <= 0.0:
         return 0.0
-    return 1.0 / (1.0 + math.exp(-STEEPNESS * math.log(ratio)))
+    return 1.0 / (1.0 + math.exp(-steepness * math.log(ratio)))
 
 
 def relative_rest(evidence: Evidence, plant: Plant) -> Array:
@@ -68,6 +76,14 @@ def _dominance(scored: Scored, number: int) -> float:
     """Return the amplitude of an effect relative to the residual of the signals it acts on."""
     rest = float(np.sqrt(scored.reach[number] @ scored.rest**2))
     return float(np.clip(scored.accounts[number] / max(rest, 1e-9), 1e-3, 1e3))
+
+
+def _corrects_form(scored: Scored, number: int, expected: float) -> float:
+    """Return the probability that a rare effect only corrects the form of the other laws."""
+    if not is_rare(scored.fit.effects[number]) or len(scored.fit.effects) == 1:
+        return 0.0
+    share = float(scored.accounts[number]) / max(float(np.linalg.norm(scored.accounts)), 1e-300)
+    return _logistic(expected / max(share, 1e-300), FORM_STEEPNESS)
 
 
 def support_of(
@@ -102,11 +118,12 @@ def support_of(
     unnamed = _logistic(rest / evidence.machine.prior.error) * _logistic(
         posterior.residual_excess / thresholds.residual_excess
     )
+    resembles = unnamed * _logistic(remains / thresholds.mimicry_share)
     return Support(
         probability=posterior.inclusion(effect),
         margin=posterior.margin(effect),
         steadiness=effect.steadiness(best.fit.values[number], best.widths[number], evidence.plant),
         remains=remains,
         dominance=_dominance(best, number),
-        mimic=unnamed * _logistic(remains / thresholds.mimicry_share),
+        mimic=max(resembles, _corrects_form(best, number, evidence.machine.prior.form)),
     )

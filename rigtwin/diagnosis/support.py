@@ -29,7 +29,7 @@ class Support:
         Amplitude that the effect accounts for, relative to the residual beyond noise and declared
         error in the signals on which it acts; 0.001 to 1000.
     mimic
-        Probability that the effect only resembles an unnamed effect.
+        Probability that the effect only resembles an unnamed effect, or corrects a law's form.
     """
 
     probability: float
