@@ -22,7 +22,7 @@ SECONDS = 6.0
 """Part of a test that is compared, s."""
 BETTER = 0.98
 """Share of the nominal misfit below which an effect is named."""
-NO_SIZES = Scales(1.0, 1.0, 1.0, 1.0, 1.0, 1.0)
+NO_SIZES = Scales(1.0, (-1.0, 1.0), 1.0, 1.0, 1.0, 1.0, 1.0)
 """Placeholder scales: the search starts of the rig do not depend on its motion."""
 
 

@@ -211,6 +211,7 @@ def _add_group(
                 tables[identifier(joint)]["effects"] = PRESCRIBED
                 tables[name]["effects"] = ["gain"]
             _add_tendons(mechanism, joints, tables)
+            _add_links(mechanism, joints, tables)
         else:
             _add_mass(mechanism, joints[0], tables)
         implied.replays.append({**keys, "moved_by": positions, "observe": forces})
@@ -235,6 +236,9 @@ def _add_group(
             tables[identifier(joint)]["effects"] = FREE[test]
         for name in movers if test == SERVOS else ():
             tables[name]["effects"] = FREE_SERVO
+        # Without a force from an actuator, only ratios of friction to mass can be seen.
+        if len(movers) == len(joints):
+            _add_link(mechanism, joints[-1], ["payload"], tables)
     implied.replays.append(replay)
 
 
@@ -254,11 +258,35 @@ def _add_tendons(
             tables[identifier(tendon)] = {"tendon": tendon, "effects": ["coulomb", "viscous"]}
 
 
+def _add_links(
+    mechanism: Mechanism, joints: Sequence[str], tables: dict[str, dict[str, Any]]
+) -> None:
+    """Add the rigid bodies that joints carry: their masses, and what the last one may hold."""
+    for joint in joints:
+        effects = ["mass", "payload"] if joint == joints[-1] else ["mass"]
+        _add_link(mechanism, joint, effects, tables)
+
+
+def _add_link(
+    mechanism: Mechanism, joint: str, effects: list[str], tables: dict[str, dict[str, Any]]
+) -> None:
+    """Add the rigid body that a joint moves, if it has a name."""
+    body = _body_of(mechanism, joint)
+    if body:
+        name = identifier(body)
+        name = f"{name}_body" if name in tables else name
+        tables[name] = {"body": body, "type": "body", "effects": effects}
+
+
+def _body_of(mechanism: Mechanism, joint: str) -> str | None:
+    """Return the name of the body that moves with a joint; None for a body without a name."""
+    number = int(mechanism.model.jnt_bodyid[mechanism.number("joint", joint)])
+    return mujoco.mj_id2name(mechanism.model, mujoco.mjtObj.mjOBJ_BODY, number)
+
+
 def _add_mass(mechanism: Mechanism, joint: str, tables: dict[str, dict[str, Any]]) -> None:
     """Add the mass that moves with a joint that is replayed alone."""
-    model = mechanism.model
-    number = int(model.jnt_bodyid[mechanism.number("joint", joint)])
-    body = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_BODY, number)
+    body = _body_of(mechanism, joint)
     if body and mechanism.joint_of("body", body) == joint:
         name = identifier(body)
         tables[f"{name}_mass" if name in tables else name] = {"body": body, "effects": ["mass"]}
