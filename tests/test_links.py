@@ -17,7 +17,8 @@ ARM = """<mujoco model="arm"><compiler angle="radian"/>
 <inertial pos="0 0 -0.15" mass="1.2" diaginertia="0.012 0.012 0.001"/>
 <body name="fore" pos="0 0 -0.3">
 <joint name="elbow" axis="0 -1 0" damping="0.3" armature="0.01"/>
-<inertial pos="0 0 -0.12" mass="0.8" diaginertia="0.006 0.006 0.0005"/>LOAD</body></body></worldbody>
+<inertial pos="0 0 -0.12" mass="0.8" diaginertia="0.006 0.006 0.0005"/>
+LOAD</body></body></worldbody>
 <actuator><position name="m1" joint="shoulder" kp="120" kv="6"/>
 <position name="m2" joint="elbow" kp="80" kv="4"/></actuator>
 <sensor><jointpos name="q1" joint="shoulder"/><jointpos name="q2" joint="elbow"/>SENSORS</sensor>
