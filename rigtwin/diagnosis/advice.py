@@ -35,6 +35,10 @@ def advise(answer: Answer) -> tuple[str, ...]:
             else ""
         )
         return (f"Nothing needs to be corrected: use the twin as it is{invisible}.",)
+    if answer.verdict == "unknown" and answer.gap is None:
+        return (
+            "Push harder, or look whether the joint is free: where nothing moves, nothing shows.",
+        )
     steps = [SAVE_TWIN] if answer.verdict == "explained" else []
     steps += _separate_rivals(answer)
     if doubtful := [effect for effect in answer.effects if effect.confidence < CONFIDENT]:

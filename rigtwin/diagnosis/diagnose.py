@@ -52,6 +52,7 @@ from rigtwin.diagnosis.regressors import describe_correlation
 from rigtwin.diagnosis.result import Diagnosis
 from rigtwin.diagnosis.sampling import SensorProperty, find_outstanding
 from rigtwin.diagnosis.short_recordings import drop_short, least_ticks
+from rigtwin.diagnosis.standstill import describe_standstill, find_standstill
 from rigtwin.diagnosis.stops import find_cut_commands, find_stops
 from rigtwin.diagnosis.support import Support
 from rigtwin.diagnosis.text import sentence
@@ -155,6 +156,23 @@ def _answer_unusable(
     )
 
 
+def _answer_standstill(
+    machine: Machine, recordings: Sequence[Recording], started: float
+) -> Answer | None:
+    """Answer for recordings in which nothing moved; None where something did."""
+    standing = find_standstill(machine, recordings)
+    if not standing:
+        return None
+    return Answer(
+        verdict="unknown",
+        sentence=describe_standstill(machine, standing),
+        notes=_recording_notes(recordings),
+        recordings=tuple(str(recording.path) for recording in recordings),
+        seconds=time.perf_counter() - started,
+        machine=machine.name,
+    )
+
+
 def _recording_notes(recordings: Sequence[Recording]) -> tuple[str, ...]:
     return tuple(
         f"{recording.path.name}: {note}" for recording in recordings for note in recording.notes
@@ -214,7 +232,9 @@ def diagnose(
     # BLAS threads would compete with the threads of the search.
     with threadpool_limits(1):
         configurations = [machine.configuration_of(recording, base) for recording in recordings]
-        unusable = _answer_unusable(machine, recordings, configurations, started)
+        unusable = _answer_standstill(machine, recordings, started) or _answer_unusable(
+            machine, recordings, configurations, started
+        )
         if unusable is not None:
             return Diagnosis(unusable, machine, None, configurations[0])
         judging_configurations = _configure_held_out(machine, held_out, base)

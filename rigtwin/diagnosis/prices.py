@@ -37,6 +37,9 @@ RARE = (
 )
 """Kinds that few machines have. The residual that dry friction leaves at the same component
 resembles them."""
+ELUSIVE = ("payload",)
+"""Kinds of a rigid body that are rare. A payload has a place besides its mass, so that it resembles
+the zero or the friction of several joints."""
 CONTAINS_SIMPLER = ("two_lags", "mount", "deadband_asymmetry")
 """Kinds that become a simpler kind at an end of their range."""
 SIMPLER_PARAMETERS = 0.5
@@ -54,6 +57,8 @@ def is_rare(effect: Effect) -> bool:
     """
     if measures(effect.of()):
         return effect.kind.name != "offset"
+    if effect.kind.name in ELUSIVE:
+        return True
     return effect.kind.name in RARE and "coulomb" in fields(effect.of)
 
 
