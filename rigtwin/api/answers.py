@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from rigtwin.api.describing import describe, is_model, record_log
+from rigtwin.api.describing import describe, needs_description, record_log
 from rigtwin.api.machines import (
     Effects,
     Settings,
@@ -162,8 +162,8 @@ def read_data(
     RigtwinError
         If there is no recording, one is named twice, or its machine is unknown.
     """
-    if is_model(machine):
-        logs = _as_list(recordings)
+    logs = _as_list(recordings)
+    if needs_description(machine, logs):
         if not logs:
             raise RigtwinError("no recording to diagnose")
         described = describe(machine, logs[0], columns=columns, test=test)  # type: ignore[arg-type]

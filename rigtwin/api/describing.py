@@ -6,7 +6,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from rigtwin.api.recordings import Recording, with_machine
-from rigtwin.describing.described import MODELS, Described, describe_log
+from rigtwin.describing.described import Described, describe_log
+from rigtwin.description.bare import MODELS
+from rigtwin.description.menagerie import find_robot, is_robot
 from rigtwin.errors import RigtwinError
 from rigtwin.recording import reader
 
@@ -65,6 +67,8 @@ def describe(
     >>> columns = {"elbow.position": "q2 [deg]"}
     >>> described = rigtwin.describe("arm.xml", "log.csv", columns=columns)  # doctest: +SKIP
     """
+    if is_robot(model):
+        model = find_robot(str(model))
     if Path(model).suffix.lower() not in MODELS:
         raise RigtwinError(f"model {model}: expected a name that ends in {', '.join(MODELS)}")
     described = describe_log(Path(model), log_files(log), columns or {}, test)
@@ -81,7 +85,34 @@ def is_model(machine: object) -> bool:
     machine
         Value of an argument `machine`.
     """
+    if is_robot(machine):
+        return True
     return isinstance(machine, str | Path) and Path(machine).suffix.lower() in MODELS
+
+
+def needs_description(machine: object, logs: Sequence[Log | reader.Recording]) -> bool:
+    """Return whether logs have to be read by a model, since they are no recordings.
+
+    Parameters
+    ----------
+    machine
+        Value of an argument `machine`.
+    logs
+        Logs or recordings.
+    """
+    return is_model(machine) and not (logs and all(_is_recording(log) for log in logs))
+
+
+def _is_recording(log: Log | reader.Recording) -> bool:
+    """Return whether a log was recorded by rigtwin."""
+    if isinstance(log, reader.Recording):
+        return True
+    if not isinstance(log, str | Path) or Path(log).suffix.lower() != ".mcap":
+        return False
+    try:
+        return bool(reader.load(Path(log)).machine)
+    except RigtwinError:
+        return False
 
 
 def log_files(log: Log | reader.Recording) -> tuple[Path, ...]:

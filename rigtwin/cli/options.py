@@ -92,12 +92,12 @@ def read_recordings(
 ) -> tuple[list[rigtwin.Recording], list[rigtwin.Recording]]:
     """Return the recordings to explain and those held out; logs of a model are described first."""
     import rigtwin
-    from rigtwin.api.describing import is_model, record_log
+    from rigtwin.api.describing import needs_description, record_log
     from rigtwin.errors import RigtwinError
 
     stated = columns_of(parsed)
     paths, held_out = parsed.recordings, parsed.held_out
-    if not is_model(parsed.machine):
+    if not needs_description(parsed.machine, paths):
         if stated or parsed.test:
             raise RigtwinError("--column and --test: of logs beside a model, --machine arm.xml")
         load = rigtwin.load

@@ -13,11 +13,11 @@ from rigtwin.describing.clock import find_clock
 from rigtwin.describing.matching import NUMBERED
 from rigtwin.describing.reading import Reading, read_log
 from rigtwin.describing.writer import (
-    name_machine,
     table_rows,
     write_description,
     write_map,
 )
+from rigtwin.description.bare import model_name, name_machine
 from rigtwin.description.document import examine_text
 from rigtwin.description.machine import Machine
 from rigtwin.description.mechanism import Mechanism
@@ -29,8 +29,6 @@ from rigtwin.importing.mapping import Map, parse
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
 
-MODELS = (".xml", ".mjcf", ".urdf")
-"""Endings of models."""
 MAP = "map.toml"
 """Name of the map's file beside a description."""
 
@@ -207,7 +205,7 @@ def describe_log(
         reading = read_log(mechanism, columns, stated, test)
     except RigtwinError as error:
         raise type(error)(f"{said}: {error}") from None
-    name = name_machine(_model_name(mechanism), model.stem)
+    name = name_machine(model_name(mechanism), model.stem)
     description = write_description(mechanism, reading, name, model.name, said)
     mapping = write_map(mechanism, columns, reading, name, said)
     machine, mistakes = examine_text(description, model)
@@ -221,8 +219,3 @@ def describe_log(
         mapping=mapping,
         rows=tuple(table_rows(mechanism, reading)),
     )
-
-
-def _model_name(mechanism: Mechanism) -> str:
-    """Name that an MJCF states, the first of the model's names."""
-    return mechanism.model.names.split(b"\0", 1)[0].decode("utf-8", "replace")

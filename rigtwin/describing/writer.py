@@ -192,23 +192,6 @@ def _quote(text: str) -> str:
     return json.dumps(text, ensure_ascii=False)
 
 
-def name_machine(model_name: str, stem: str) -> str:
-    """Return the name of a machine: letters, digits, - and _.
-
-    Parameters
-    ----------
-    model_name
-        Name that the model states.
-    stem
-        Name of the model's file without its ending.
-    """
-    for text in (model_name, stem):
-        plain = "-".join("".join(c if c.isalnum() and c.isascii() else " " for c in text).split())
-        if plain and text not in ("MuJoCo Model", ""):
-            return plain
-    return "machine"
-
-
 def table_rows(mechanism: Mechanism, reading: Reading) -> list[Sequence[str]]:
     """Return the table of what was taken for what: signal, source, unit and reasons.
 

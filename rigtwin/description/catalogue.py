@@ -6,8 +6,10 @@ from functools import cache
 from importlib.resources import files
 from pathlib import Path
 
+from rigtwin.description.bare import MODELS, describe_model
 from rigtwin.description.document import load
 from rigtwin.description.machine import Machine
+from rigtwin.description.menagerie import find_robot, is_robot
 from rigtwin.errors import RigtwinError
 
 SHIPPED = Path(str(files("machines")))
@@ -30,7 +32,8 @@ def find(name: str) -> Machine:
     Parameters
     ----------
     name
-        Name of a shipped machine, or path of a description.
+        Name of a shipped machine, of a robot such as `menagerie:universal_robots_ur5e`, or path of
+        a description or of a model without one.
 
     Raises
     ------
@@ -40,12 +43,9 @@ def find(name: str) -> Machine:
     # Shipped descriptions do not change while Python runs; a user's may, and is read anew.
     if name in shipped():
         return _load_once(shipped()[name])
-    path = Path(name)
-    if path.suffix.lower() in (".xml", ".mjcf", ".urdf"):
-        raise RigtwinError(
-            f"{name}: a model without a description; rigtwin describe {name} --log LOG "
-            "--out FOLDER writes one, and rigtwin diagnose LOG takes a model as it is"
-        )
+    path = find_robot(name) if is_robot(name) else Path(name)
+    if path.suffix.lower() in MODELS:
+        return describe_model(path)
     if path.suffix == ".toml" or path.exists():
         return load(path)
     raise RigtwinError(

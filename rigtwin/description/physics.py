@@ -205,6 +205,27 @@ class Physics(ABC):
     def excite(self, machine: Machine) -> Iterator[Recording]:
         """Yield recordings of the twin under rich motions within the joints' ranges."""
 
+    def demand_motions(
+        self, machine: Machine, configuration: Configuration, seed: int
+    ) -> Mapping[str, Array] | None:
+        """Return demands that move every joint richly and gently; None where a range is unknown.
+
+        Parameters
+        ----------
+        machine
+            Machine that is to move.
+        configuration
+            Settings, whose timing gives the ticks.
+        seed
+            Seed of the motions.
+
+        Returns
+        -------
+        dict or None
+            Channel `/topic.field` → values, shape (ticks,).
+        """
+        return None
+
     def base_parameters(self, machine: Machine) -> tuple[Mapping[str, float], ...]:
         """Return the sums of inertial parameters of which only the sum is observable."""
         return ()

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
 from rigtwin.components import ForceActuator
+from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Joint, Machine
 from rigtwin.description.mechanism import Mechanism
 from rigtwin.errors import RigtwinError
 from rigtwin.models.demands import demanded_channels
+from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
 from rigtwin.signals.excitation import multisine
 
@@ -21,6 +23,9 @@ REACHES = (0.3, 0.08)
 """rms of the motions, as shares of half a joint's range."""
 BAND = (0.15, 12.0)
 """Frequency band of the motions, Hz."""
+GENTLE_SHARE, GENTLE_HIGHEST = 0.15, 2.5
+"""rms of the motions of a test of any machine, as a share of half a joint's range, and their
+highest frequency, Hz: joints stay within their range, and drives within their force."""
 SLOPE = 1.0
 """Power of the frequency with which the amplitudes fall."""
 Reach = tuple[float, float]
@@ -46,33 +51,65 @@ def excite(
     timing = machine.configuration.timing._replace(duration=SECONDS)
     timing = timing._replace(period=max(timing.period, least_period))
     configuration = machine.configuration._replace(timing=timing)
-    time = np.arange(configuration.ticks) * timing.period
     for number, share in enumerate(REACHES, 1):
         # Fixed seeds: what the machine can show must not differ from call to call.
-        random = np.random.default_rng([number, 17])
-        demands = {}
-        for channel in demanded_channels(machine):
-            size = reach(machine, channel)
-            if size is None:
-                return
-            wave = multisine(
-                time,
-                lowest=BAND[0],
-                # Differentiating twice needs several samples per wave.
-                highest=min(BAND[1], 0.2 / timing.period),
-                spacing=BAND[0],
-                slope=SLOPE,
-                rms=1.0,
-                random=random,
-            )
-            middle, half = size
-            demands[".".join(channel)] = middle + share * half * wave
+        demands = demand_multisines(machine, reach, configuration, share, BAND[1], [number, 17])
+        if demands is None:
+            return
         name = f"multisine {number}"
         try:
             yield machine.physics.simulate(machine, name, configuration, demands, number)
         except RigtwinError:
             # A motion that diverges shows nothing: the series ends here.
             return
+
+
+def demand_multisines(
+    machine: Machine,
+    reach: Callable[[Machine, tuple[str, str]], Reach | None],
+    configuration: Configuration,
+    share: float,
+    highest: float,
+    seed: Sequence[int],
+) -> dict[str, Array] | None:
+    """Return a multisine for each demanded channel; None where a range is unknown.
+
+    Parameters
+    ----------
+    machine
+        Machine that is to move.
+    reach
+        Range of what may be demanded of a channel.
+    configuration
+        Settings, whose timing gives the ticks.
+    share
+        rms of each motion, as a share of half its range.
+    highest
+        Highest frequency, Hz.
+    seed
+        Seed of the phases.
+    """
+    period = configuration.timing.period
+    time = np.arange(configuration.ticks) * period
+    random = np.random.default_rng(seed)
+    demands = {}
+    for channel in demanded_channels(machine):
+        size = reach(machine, channel)
+        if size is None:
+            return None
+        wave = multisine(
+            time,
+            lowest=BAND[0],
+            # Differentiating twice needs several samples per wave.
+            highest=min(highest, 0.2 / period),
+            spacing=BAND[0],
+            slope=SLOPE,
+            rms=1.0,
+            random=random,
+        )
+        middle, half = size
+        demands[".".join(channel)] = middle + share * half * wave
+    return demands
 
 
 def reach_of_component(machine: Machine, channel: tuple[str, str]) -> Reach | None:

@@ -231,6 +231,15 @@ class PrescribedJoints(IndependentJoints):
 
         return reach_of_component(machine, channel)
 
+    def demand_motions(
+        self, machine: Machine, configuration: Configuration, seed: int
+    ) -> Mapping[str, Array] | None:
+        from rigtwin.joints.excitation import GENTLE_HIGHEST, GENTLE_SHARE, demand_multisines
+
+        return demand_multisines(
+            machine, self.reach, configuration, GENTLE_SHARE, GENTLE_HIGHEST, [seed, 23]
+        )
+
     def base_parameters(self, machine: Machine) -> tuple[Mapping[str, float], ...]:
         from rigtwin.joints.base_parameters import find_base_parameters
 

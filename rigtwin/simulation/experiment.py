@@ -22,6 +22,11 @@ Demands = Array | Mapping[str, Array]
 (m), structure (m) and force (N), shape (ticks, 3); the last two for imposed tests only. On another
 machine: demanded channel → values, shape (ticks,)."""
 
+EXCITE = "excite"
+"""Name of the test that every machine of joints has."""
+EXCITED = 10.0
+"""Its duration, s."""
+
 
 @dataclass(frozen=True)
 class Experiment:
@@ -71,6 +76,33 @@ class FormulaDemands:
         return demands
 
 
+@dataclass(frozen=True)
+class MotionDemands:
+    """Demands of the test `excite`: multisines of all joints within their ranges.
+
+    Parameters
+    ----------
+    machine
+        Machine that is to move.
+    """
+
+    machine: Machine
+
+    @property
+    def possible(self) -> bool:
+        """Whether the description states how far every demand may go."""
+        timing = self.machine.configuration.timing
+        short = timing._replace(duration=2.0 * timing.period)
+        configuration = self.machine.configuration._replace(timing=short)
+        return self.machine.physics.demand_motions(self.machine, configuration, 0) is not None
+
+    def __call__(self, configuration: Configuration, seed: int) -> Demands:
+        """Return the demands of every tick: channel → array of shape (ticks,)."""
+        demands = self.machine.physics.demand_motions(self.machine, configuration, seed)
+        assert demands is not None
+        return dict(demands)
+
+
 def experiments_of(machine: Machine) -> dict[str, Experiment]:
     """Return the experiments of a machine.
 
@@ -105,7 +137,25 @@ def experiments_of(machine: Machine) -> dict[str, Experiment]:
             name: replace(e, configuration=rebase(e.configuration, base))
             for name, e in known.items()
         }
-    return {name: _from_table(machine, name, table) for name, table in machine.experiments.items()}
+    stated = {
+        name: _from_table(machine, name, table) for name, table in machine.experiments.items()
+    }
+    return {**_excite(machine), **stated}
+
+
+def _excite(machine: Machine) -> dict[str, Experiment]:
+    """Return the test that every machine of joints has: all joints move richly and gently."""
+    timing = machine.configuration.timing._replace(duration=EXCITED)
+    configuration = machine.configuration._replace(timing=timing)
+    demands = MotionDemands(machine)
+    experiment = Experiment(
+        name=EXCITE,
+        summary="all joints to and fro at once, by multisines from the seed",
+        source="for diagnosis",
+        configuration=configuration,
+        demands=demands,
+    )
+    return {EXCITE: experiment} if demands.possible else {}
 
 
 def _from_table(machine: Machine, name: str, table: Mapping[str, Any]) -> Experiment:
