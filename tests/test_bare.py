@@ -55,7 +55,7 @@ def test_every_machine_of_joints_has_a_test_within_its_ranges(tmp_path: Path):
         assert -1.0 < command.min() < command.max() < 0.5
     again = rigtwin.run(tmp_path / "arm.xml", "excite", seed=3, settings=SHORT)
     assert np.array_equal(recording["/sensor.q1"], again["/sensor.q1"])
-    assert "excite" in rigtwin.experiments("emps")
+    assert "excite" in rigtwin.experiments("tx40")
 
 
 def test_a_hidden_friction_is_found_by_the_model_alone(motors: Path, tmp_path: Path):

@@ -364,8 +364,3 @@ def test_the_command_prints_what_was_taken_for_what(
     assert "expected KEY=SOURCE" in capsys.readouterr().err
     assert main(["diagnose", str(log), "--machine", "damper-bench", "--column", "time=t"]) == 1
     assert "--machine arm.xml" in capsys.readouterr().err
-
-
-def test_a_model_where_a_description_is_expected_says_how_to_write_one(tmp_path: Path):
-    with pytest.raises(RigtwinError, match="rigtwin describe .*arm.xml --log LOG"):
-        rigtwin.machine(write_arm(tmp_path))

@@ -35,7 +35,7 @@ def advise(answer: Answer) -> tuple[str, ...]:
             else ""
         )
         return (f"Nothing needs to be corrected: use the twin as it is{invisible}.",)
-    if answer.verdict == "unknown" and answer.gap is None:
+    if answer.verdict == "unknown" and answer.gap is None and not answer.where:
         return (
             "Push harder, or look whether the joint is free: where nothing moves, nothing shows.",
         )

@@ -14,8 +14,13 @@ closed. L is smooth, so that no small change of the data turns a confident answe
 
 A rare effect may also correct the form of a law: real friction and real springs differ a little
 from those of the library, and what differs resembles a small play, compliance or lag. Its mimic has
-at least the probability 1 / (1 + (a / form)^8), where a is the amplitude that the effect accounts
-for, relative to that of all effects, and form the deviation that is expected (`ModelPrior.form`).
+at least the probability
+
+    1 / (1 + (a / form)^8) · L(clean · remains / a),
+
+where a is the share of the gap's amplitude that returns without the effect, and form the deviation
+of a law's form that is expected (`ModelPrior.form`). A true effect explains its part cleanly: with
+it, far less remains than it explains.
 """
 
 from __future__ import annotations
@@ -36,6 +41,8 @@ from rigtwin.numerics.arrays import Array
 
 STEEPNESS = 4.0
 """Exponent s of the logistic functions."""
+CLEAN = 8.0
+"""Ratio of what an effect explains to what remains from which it explains its part cleanly."""
 FORM_STEEPNESS = 8.0
 """Exponent of the logistic function of an effect that may correct the form of a law."""
 
@@ -78,12 +85,26 @@ def _dominance(scored: Scored, number: int) -> float:
     return float(np.clip(scored.accounts[number] / max(rest, 1e-9), 1e-3, 1e3))
 
 
-def _corrects_form(scored: Scored, number: int, expected: float) -> float:
-    """Return the probability that a rare effect only corrects the form of the other laws."""
-    if not is_rare(scored.fit.effects[number]) or len(scored.fit.effects) == 1:
-        return 0.0
-    share = float(scored.accounts[number]) / max(float(np.linalg.norm(scored.accounts)), 1e-300)
-    return _logistic(expected / max(share, 1e-300), FORM_STEEPNESS)
+def _share_of(effect: Effect, posterior: HypothesisPosterior) -> float:
+    """Return the share of the gap's amplitude that returns where an effect is left out."""
+    gap = float(posterior.excess(posterior.empty).sum())
+    without = next(
+        (h.scored for h in posterior.ranking if effect not in h.scored.fit.effects),
+        posterior.empty,
+    )
+    returned = posterior.excess(without).sum() - posterior.excess(posterior.best).sum()
+    return math.sqrt(max(float(returned), 0.0) / gap) if gap > 0.0 else 0.0
+
+
+def _corrects_form(share: float, expected: float, remains: float) -> float:
+    """Return the probability that a rare effect only corrects the form of the other laws.
+
+    `share` is that of the gap's amplitude that returns without the effect, `remains` that which is
+    left with it, and `expected` the deviation of a law's form.
+    """
+    share = max(share, 1e-9)
+    small = _logistic(expected / share, FORM_STEEPNESS)
+    return small * _logistic(CLEAN * remains / share)
 
 
 def support_of(
@@ -118,6 +139,10 @@ def support_of(
     unnamed = _logistic(rest / evidence.machine.prior.error) * _logistic(
         posterior.residual_excess / thresholds.residual_excess
     )
+    form = 0.0
+    if is_rare(effect) and len(best.fit.effects) > 1:
+        share = _share_of(effect, posterior)
+        form = _corrects_form(share, evidence.machine.prior.form, remains)
     resembles = unnamed * _logistic(remains / thresholds.mimicry_share)
     return Support(
         probability=posterior.inclusion(effect),
@@ -125,5 +150,5 @@ def support_of(
         steadiness=effect.steadiness(best.fit.values[number], best.widths[number], evidence.plant),
         remains=remains,
         dominance=_dominance(best, number),
-        mimic=max(resembles, _corrects_form(best, number, evidence.machine.prior.form)),
+        mimic=max(resembles, form),
     )

@@ -76,6 +76,9 @@ def sliders_of(
         origin = min(max(nominal, low), WIDER * max(abs(value) for value in starts))
         most = max(origin, *(max(value, WIDER * value) for value in starts))
         least = min(origin, *(min(value, WIDER * value) for value in starts))
+        if not least < most:
+            # A search starts from one value, such as the middle of a range, which is nominal too.
+            least, most = least - 1.0, most + 1.0
         sliders.append(
             Slider(
                 effect=effect.name,

@@ -10,12 +10,17 @@ import numpy as np
 import pytest
 
 from rigtwin.components import find
-from rigtwin.diagnosis.confidence import relative_rest, support_of
+from rigtwin.diagnosis.confidence import (
+    _corrects_form,
+    _share_of,
+    relative_rest,
+    support_of,
+)
 from rigtwin.diagnosis.thresholds import STANDARD
 from tests.engine.linear import PLANT
 
 VISCOUS, COULOMB = find("viscous@rail", PLANT), find("coulomb@rail", PLANT)
-ERROR, REST, MIMICRY = 0.05, 0.15, 0.17
+ERROR, REST, MIMICRY, FORM = 0.05, 0.15, 0.17, 0.14
 
 
 def logistic(ratio: float) -> float:
@@ -48,7 +53,7 @@ def evidence_of(off: float, nominal: float = 1.0) -> Any:
         return [signals - share * OFF[:, None] for signals in SIGNALS]
 
     lines = [recorded(SIGNALS[0], [0.1, 0.0], 4), recorded(SIGNALS[1], [0.2, 0.0], 3)]
-    machine = SimpleNamespace(prior=SimpleNamespace(error=ERROR))
+    machine = SimpleNamespace(prior=SimpleNamespace(error=ERROR, form=FORM))
     return SimpleNamespace(lines=lines, predict=predict, plant=PLANT, machine=machine)
 
 
@@ -104,6 +109,32 @@ def test_the_support_of_an_effect_is_written_out(off, reach, rest):
     ratios = (after / ERROR, rest / REST, after / before / MIMICRY)
     mimic = math.prod(logistic(float(ratio)) for ratio in ratios)
     assert found.mimic == pytest.approx(mimic)
+
+
+@pytest.mark.parametrize("share", [0.02, 0.14, 0.6])
+@pytest.mark.parametrize("remains", [0.001, 0.02, 0.3])
+def test_a_rare_effect_that_explains_little_may_correct_the_form_of_a_law(share, remains):
+    """m = 1/(1 + (a/form)^8) · L(8 · remains/a)."""
+    expected = 1.0 / (1.0 + (share / FORM) ** 8) * logistic(8.0 * remains / share)
+    assert _corrects_form(share, FORM, remains) == pytest.approx(expected)
+
+
+def test_the_share_of_an_effect_is_what_returns_without_it():
+    """√((excess without it − excess with it)/gap), of the best hypothesis without it."""
+    backlash = find("backlash@rail", PLANT)
+    scored = {
+        effects: SimpleNamespace(fit=SimpleNamespace(effects=effects))
+        for effects in ((), (COULOMB,), (COULOMB, backlash))
+    }
+    excess = dict(zip(scored, ([60.0, 40.0], [20.0, 5.0], [8.0, 1.0]), strict=True))
+    posterior: Any = SimpleNamespace(
+        best=scored[COULOMB, backlash],
+        empty=scored[()],
+        ranking=[SimpleNamespace(scored=scored[effects]) for effects in reversed(scored)],
+        excess=lambda one: np.array(excess[one.fit.effects]),
+    )
+    assert _share_of(backlash, posterior) == pytest.approx(math.sqrt((25.0 - 9.0) / 100.0))
+    assert _share_of(COULOMB, posterior) == pytest.approx(math.sqrt((100.0 - 9.0) / 100.0))
 
 
 def test_remains_stay_within_the_gap_and_are_none_without_a_gap():

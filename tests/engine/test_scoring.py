@@ -139,15 +139,15 @@ def test_two_effects_undo_each_other_by_their_joint_response():
     stack = np.stack([first, second, third])
     gram = np.zeros((1, 1, 1, 1, 4, 4))
     gram[0, 0, 0, 0, :3, :3] = stack @ stack.T
-    moves = np.array([1.0, 1.5, 0.5])
-    found = _together(moves, [0, 1, 2], gram)
+    moves = np.diag([1.0, 1.5, 0.5])
+    found = _together(moves, gram)
     joint = np.linalg.norm(first + 1.5 * second) / np.linalg.norm(first)
     assert joint < 1.0
     assert found[0, 1] == found[1, 0] == pytest.approx(joint)
     assert found[0, 2] == found[1, 2] == 1.0
-    opposed = _together(np.array([1.0, 1.0, -1.0]), [0, 1, 2], gram)
+    opposed = _together(np.diag([1.0, 1.0, -1.0]), gram)
     assert opposed[0, 2] == pytest.approx(min(np.linalg.norm(first - third) / 2.0, 1.0))
-    vanishing = _together(np.array([1.0, -1.0 + 0.0, 0.0]), [0, 1, 2], gram)
+    vanishing = _together(np.diag([1.0, -1.0, 0.0]), gram)
     assert vanishing[0, 2] == 1.0
 
 
@@ -156,9 +156,25 @@ def test_reach_is_the_share_of_each_signal_in_a_response():
     products[0, 0, 0, :, 0, 0] = (1.0, 2.0, 0.0)
     products[0, 1, 0, :, 0, 0] = (0.0, 0.0, 9.0)
     products[0, 1, 0, :, 1, 1] = (4.0, 0.0, 0.0)
-    found = _reach([0, 1], products)
-    np.testing.assert_allclose(found, [[0.25, 0.75], [0.0, 1.0]])
-    assert not np.any(_reach([2], products))
+    moves = np.array([[2.0, 0.0, 0.0], [0.0, 0.5, 0.0], [0.0, 0.0, 0.0]])
+    np.testing.assert_allclose(_reach(moves, products)[:2], [[0.25, 0.75], [0.0, 1.0]])
+    assert not np.any(_reach(moves, products)[2])
+
+
+def test_several_magnitudes_of_one_effect_respond_together():
+    """Two coefficients with the responses a and b of one signal: the power is |m₁ a + m₂ b|²."""
+    first, second = np.array([3.0, 0.0, 1.0]), np.array([-2.0, 1.0, 4.0])
+    stack = np.stack([first, second, np.array([0.0, 2.0, 0.0])])
+    products = np.zeros((1, 2, 1, 1, 4, 4))
+    products[0, 0, 0, 0, :3, :3] = stack @ stack.T
+    products[0, 1, 0, 0, 2, 2] = 5.0
+    moves = np.array([[1.0, 0.0], [0.5, 0.0], [0.0, 1.0]])
+    np.testing.assert_allclose(_reach(moves, products), [[1.0, 0.0], [4.0 / 9.0, 5.0 / 9.0]])
+    joint = _together(moves, products)
+    both, other = first + 0.5 * second, stack[2]
+    sizes = [both @ both, other @ other + 5.0]
+    expected = np.sqrt((sum(sizes) + 2.0 * both @ other) / min(sizes)) if both @ other < 0 else 1.0
+    assert joint[0, 1] == pytest.approx(min(expected, 1.0))
 
 
 TICKS = 2400
