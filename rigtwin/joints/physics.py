@@ -126,6 +126,15 @@ class IndependentJoints(Physics):
 
         return excite(machine, self.reach, self.least_period)
 
+    def demand_motions(
+        self, machine: Machine, configuration: Configuration, seed: int
+    ) -> Mapping[str, Array] | None:
+        from rigtwin.joints.excitation import GENTLE_HIGHEST, GENTLE_SHARE, demand_multisines
+
+        return demand_multisines(
+            machine, self.reach, configuration, GENTLE_SHARE, GENTLE_HIGHEST, [seed, 23]
+        )
+
     def reach(self, machine: Machine, channel: tuple[str, str]) -> tuple[float, float] | None:
         """Return middle and half width of what may be demanded of a channel, None if unknown."""
         from rigtwin.joints.excitation import reach_of_replay
@@ -230,15 +239,6 @@ class PrescribedJoints(IndependentJoints):
         from rigtwin.joints.excitation import reach_of_component
 
         return reach_of_component(machine, channel)
-
-    def demand_motions(
-        self, machine: Machine, configuration: Configuration, seed: int
-    ) -> Mapping[str, Array] | None:
-        from rigtwin.joints.excitation import GENTLE_HIGHEST, GENTLE_SHARE, demand_multisines
-
-        return demand_multisines(
-            machine, self.reach, configuration, GENTLE_SHARE, GENTLE_HIGHEST, [seed, 23]
-        )
 
     def base_parameters(self, machine: Machine) -> tuple[Mapping[str, float], ...]:
         from rigtwin.joints.base_parameters import find_base_parameters
