@@ -12,15 +12,15 @@ is the probability of a mimic, s the steepness of the logistic function L, rest 
 noise, excess that beyond noise and declared error, and remains the share of the gap that is not
 closed. L is smooth, so that no small change of the data turns a confident answer around.
 
-A rare effect may also correct the form of a law: real friction and real springs differ a little
-from those of the library, and what differs resembles a small play, compliance or lag. Its mimic has
-at least the probability
+An effect may also correct the form of a law: real friction and real springs differ a little from
+those of the library, and what differs resembles a small play, compliance or lag. Its mimic has at
+least the probability
 
     1 / (1 + (a / form)^8) · L(clean · remains / a),
 
 where a is the share of the gap's amplitude that returns without the effect, and form the deviation
-of a law's form that is expected (`ModelPrior.form`). A true effect explains its part cleanly: with
-it, far less remains than it explains.
+of a law's form that is expected: `ModelPrior.form`, or a quarter of it for effects that are not
+rare. A true effect explains its part cleanly: with it, far less remains than it explains.
 """
 
 from __future__ import annotations
@@ -45,6 +45,8 @@ CLEAN = 8.0
 """Ratio of what an effect explains to what remains from which it explains its part cleanly."""
 FORM_STEEPNESS = 8.0
 """Exponent of the logistic function of an effect that may correct the form of a law."""
+COMMON = 0.25
+"""Deviation of a form that a common effect corrects, relative to that of a rare one."""
 
 
 def _logistic(ratio: float, steepness: float = STEEPNESS) -> float:
@@ -86,18 +88,23 @@ def _dominance(scored: Scored, number: int) -> float:
 
 
 def _share_of(effect: Effect, posterior: HypothesisPosterior) -> float:
-    """Return the share of the gap's amplitude that returns where an effect is left out."""
+    """Return the share of the gap's amplitude that returns where an effect is left out.
+
+    Without it, the best hypothesis counts that has no other effect in its place.
+    """
     gap = float(posterior.excess(posterior.empty).sum())
+    remaining = {*posterior.best.fit.effects} - {effect}
     without = next(
-        (h.scored for h in posterior.ranking if effect not in h.scored.fit.effects),
-        posterior.empty,
+        hypothesis.scored
+        for hypothesis in posterior.ranking
+        if {*hypothesis.scored.fit.effects} <= remaining
     )
     returned = posterior.excess(without).sum() - posterior.excess(posterior.best).sum()
     return math.sqrt(max(float(returned), 0.0) / gap) if gap > 0.0 else 0.0
 
 
 def _corrects_form(share: float, expected: float, remains: float) -> float:
-    """Return the probability that a rare effect only corrects the form of the other laws.
+    """Return the probability that an effect only corrects the form of the other laws.
 
     `share` is that of the gap's amplitude that returns without the effect, `remains` that which is
     left with it, and `expected` the deviation of a law's form.
@@ -140,9 +147,9 @@ def support_of(
         posterior.residual_excess / thresholds.residual_excess
     )
     form = 0.0
-    if is_rare(effect) and len(best.fit.effects) > 1:
-        share = _share_of(effect, posterior)
-        form = _corrects_form(share, evidence.machine.prior.form, remains)
+    if len(best.fit.effects) > 1:
+        expected = evidence.machine.prior.form * (1.0 if is_rare(effect) else COMMON)
+        form = _corrects_form(_share_of(effect, posterior), expected, remains)
     resembles = unnamed * _logistic(remains / thresholds.mimicry_share)
     return Support(
         probability=posterior.inclusion(effect),
