@@ -82,6 +82,7 @@ def test_the_same_lines_for_every_machine(tmp_path, sort, experiment, effect, ma
     assert better.video(tmp_path / "better.mp4", until=0.3).stat().st_size > 1000
 
 
+@pytest.mark.slow
 def test_a_film_shows_where_the_twin_is(tmp_path):
     recording = rigtwin.run(
         "suspension-rig", "imposed", effects={"coulomb@rail": 70}, settings=SHORT

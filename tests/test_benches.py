@@ -83,6 +83,7 @@ def test_the_effects_of_a_bench_are_named_with_their_magnitude(name: str):
     assert found.gap.shrinkage_held_out.value > 0.9
 
 
+@pytest.mark.slow
 def test_a_slow_logger_and_a_stepping_command():
     """50 Hz, steps, half a millimetre a bit: a lag and a delay are not taken for one effect of
     second order."""

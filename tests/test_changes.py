@@ -41,6 +41,7 @@ def recorded(
     ]
 
 
+@pytest.mark.slow
 def test_nothing_changed(machine: rigtwin.Machine):
     found = rigtwin.what_changed(recorded(machine, (6.0, 6.0)))
     assert found.changed == ()

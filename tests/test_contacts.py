@@ -39,6 +39,7 @@ def test_a_recording_without_contact_has_no_such_line(machine: rigtwin.Machine) 
     assert find_contacts(machine, recording_of(machine, 0.0 * position, position)) == []
 
 
+@pytest.mark.slow
 def test_a_comparison_and_a_diagnosis_say_what_touches(machine: rigtwin.Machine) -> None:
     time, noise = np.arange(4000) * 1e-3, np.random.default_rng(3).normal(0.0, 1e-5, 4000)
     position = 0.12 + 0.1 * np.sin(3.0 * time) + noise

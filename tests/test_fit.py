@@ -155,6 +155,7 @@ def test_spikes_go_and_steps_stay():
     assert (signal[50:] == 20.0).all()
 
 
+@pytest.mark.slow
 def test_two_effects_are_told_apart():
     evidence = evidence_of(
         recorded("imposed", ("viscous@motor=60", "gain@suspension_lvdt=0.96"), 5.0)

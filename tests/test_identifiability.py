@@ -99,6 +99,7 @@ def test_joints_that_act_on_each_other_are_moved_too():
     assert not can.unseen
 
 
+@pytest.mark.slow
 def test_every_effect_that_is_looked_for_is_judged_once():
     machine = rigtwin.machine("damper-bench")
     can = rigtwin.identifiability(machine)

@@ -31,6 +31,7 @@ def hardened(machine: rigtwin.Machine) -> rigtwin.Diagnosis:
     return rigtwin.diagnose(recording)
 
 
+@pytest.mark.slow
 def test_a_hardening_spring_is_found(hardened: rigtwin.Diagnosis):
     assert hardened.verdict == "explained", hardened.sentence
     assert {str(finding.name) for finding in hardened.effects} == {
@@ -43,12 +44,14 @@ def test_a_hardening_spring_is_found(hardened: rigtwin.Diagnosis):
         assert position_force(guide, position, 0.0) == pytest.approx(expected, abs=1.0)
 
 
+@pytest.mark.slow
 def test_it_is_told_by_its_forces_and_not_by_a_coefficient(hardened: rigtwin.Diagnosis):
     assert "position-dependent force from -" in hardened.sentence
     assert "over the stroke" in hardened.sentence
     assert "force at a position: " in describe(hardened.answer)
 
 
+@pytest.mark.slow
 def test_the_corrected_twin_has_it(hardened: rigtwin.Diagnosis):
     guide = hardened.corrected.plant.guide
     finding = next(found for found in hardened.effects if found.curve)

@@ -84,8 +84,9 @@ def record(path: Path, lag: float) -> rigtwin.Recording:
     return rigtwin.import_data(path, table, path.with_suffix(".mcap"))
 
 
+@pytest.mark.slow
 def test_friction_that_follows_a_voltage_is_found(folder: Path):
-    recording = record(folder / "log.csv", 0.02)
+    recording = record(folder / "log.csv", 0.05)
     answer = rigtwin.diagnose(recording, machine=rigtwin.machine(folder / "machine.toml"))
     found = {str(e.name): next(iter(e.parameters.values())) for e in answer.effects}
     assert set(found) == {
@@ -98,7 +99,7 @@ def test_friction_that_follows_a_voltage_is_found(folder: Path):
     assert found["coulomb@voltage"].unit == "N/V"
     assert found["coulomb@piston"].value == pytest.approx(30.0, rel=0.05)
     assert found["viscous@piston"].value == pytest.approx(400.0, rel=0.05)
-    assert found["lag@voltage"].value == pytest.approx(0.02, rel=0.1)
+    assert found["lag@voltage"].value == pytest.approx(0.05, rel=0.1)
 
 
 def test_an_unused_channel_is_named_where_the_residual_changes_with_it(folder: Path):

@@ -522,6 +522,7 @@ def test_a_session_in_real_time_is_kept_by_the_guardian(tmp_path):
     ("number", "said"),
     [(signal.SIGKILL, "guardian process is gone"), (signal.SIGSTOP, "does not answer any more")],
 )
+@pytest.mark.slow
 def test_without_its_guardian_the_session_stops(tmp_path, number, said):
     import multiprocessing
 

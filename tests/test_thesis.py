@@ -189,6 +189,7 @@ def test_a_fit_recovers_a_transfer_function():
     assert above == pytest.approx([float(one) for one in ELECTRIC[0]], rel=1e-6)
 
 
+@pytest.mark.slow
 def test_a_study_from_end_to_end(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     out = [

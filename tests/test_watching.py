@@ -136,6 +136,7 @@ def grow(whole: Path, path: Path, pieces: int, pause: float) -> threading.Thread
     return thread
 
 
+@pytest.mark.slow
 def test_what_grows_is_judged_as_what_is_whole(nominal, tmp_path):
     path = tmp_path / "growing.mcap"
     writer = grow(nominal, path, 40, 0.02)
