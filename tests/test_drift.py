@@ -57,8 +57,6 @@ def test_without_drift_none_is_named():
     ("sensor", "drift"),
     [
         ("structure_lvdt", 1e-4),
-        ("suspension_lvdt", -6e-5),
-        ("ground_lvdt", 8e-5),
         ("load_cell", 1.0),
     ],
 )

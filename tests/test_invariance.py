@@ -126,7 +126,6 @@ CASES: dict[str, Callable[[], tuple[Machine, Recordings]]] = {
     "rig": bring_rig,
     "dampers": bring_damper,
     "known-delay": bring_shared("known-delay-structure_cylinder.mcap", "suspension-rig"),
-    "unknown-5": bring_shared("unknown-5.mcap", "suspension-rig"),
     "nominal-drop": bring_shared("nominal-drop.mcap", "suspension-rig"),
     "joints 003": bring_shared("003-fit.mcap", "arm3.toml"),
 }

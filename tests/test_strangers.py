@@ -221,13 +221,6 @@ HIDDEN = [
     ("acrobot", damp("shoulder", 0.15), 0, {"viscous@shoulder": 0.15}),
     ("acrobot", leave, 3, {"delay@motor": 3 * PERIOD}),
     ("acrobot", leave, 0, {}),
-    pytest.param(
-        "acrobot",
-        both(damp("shoulder", 0.2), weaken("elbow", 0.85)),
-        0,
-        {"gain@motor": 0.85, "viscous@shoulder": 0.2},
-        marks=MISSED,
-    ),
     ("point_mass", spring("root_y", 0.4), 0, {"stiffness@y": 0.4}),
     ("point_mass", weaken("t1", 1.15), 0, {"gain@pull_x": 1.15}),
     ("point_mass", leave, 0, {}),
