@@ -135,7 +135,7 @@ def table(rows: Iterator[list[str]]) -> Iterator[str]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("models", nargs="+", help="models, or names such as menagerie:franka_fr3")
     parser.add_argument("--out", type=Path, help="file of the table, Markdown")
     parsed = parser.parse_args()
