@@ -241,7 +241,7 @@ def alive(process: int) -> bool:
 @pytest.fixture(scope="module")
 def cluster(tmp_path_factory):
     """A scheduler and two workers, a process each; yields the address and the workers."""
-    pytest.importorskip("distributed")
+    distributed = pytest.importorskip("distributed")
     folder = tmp_path_factory.mktemp("cluster")
     file = folder / "scheduler.json"
     environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])}
@@ -270,7 +270,10 @@ def cluster(tmp_path_factory):
         deadline = time.monotonic() + 60.0
         while not file.exists() and time.monotonic() < deadline:
             time.sleep(0.1)
-        yield json.loads(file.read_text())["address"], workers
+        address = json.loads(file.read_text())["address"]
+        with distributed.Client(address, set_as_default=False) as client:
+            client.wait_for_workers(len(workers), timeout=60)
+        yield address, workers
     finally:
         for process in (*workers, scheduler):
             process.kill()
@@ -337,6 +340,7 @@ def test_tune_says_the_same_on_a_cluster(cluster, tmp_path, capsys):
         assert (tmp_path / "here" / file).read_bytes() == (tmp_path / "there" / file).read_bytes()
 
 
+@pytest.mark.slow
 def test_a_failing_job_on_a_cluster_is_one_line(cluster):
     address, _ = cluster
     with (
