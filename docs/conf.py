@@ -27,6 +27,8 @@ release = rigtwin.__version__
 
 extensions = ["sphinx.ext.autodoc", "sphinx.ext.napoleon", "myst_parser"]
 default_role = "literal"
+# Several classes have an attribute of one name, such as gap; a word in a docstring means none.
+suppress_warnings = ["ref.python"]
 html_theme = "furo"
 html_title = f"rigtwin {release}"
 myst_heading_anchors = 3
