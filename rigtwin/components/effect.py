@@ -305,6 +305,11 @@ class Effect:
             Values of the effect's parameters.
         plant
             Plant without the effect.
+
+        Returns
+        -------
+        tuple of float
+            One distance for each magnitude, in its unit.
         """
         nominal = self.nominal(plant)
         names = self.kind.parameters[: self.kind.magnitudes]
@@ -321,6 +326,11 @@ class Effect:
             Values of the effect's parameters, and their standard errors.
         plant
             Plant without the effect.
+
+        Returns
+        -------
+        float
+            Largest ratio of distance to standard error.
         """
         distances = self.distances(values, plant)
         return max(

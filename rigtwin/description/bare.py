@@ -6,6 +6,7 @@ other joints move as demanded, and the forces that this takes are predicted.
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 from rigtwin.description.document import examine_text
@@ -61,7 +62,7 @@ def describe_model(model: Path) -> Machine:
     test = SERVOS if all(_has_servo(mechanism, joint) for joint in joints) else INVERSE
     name = name_machine(model_name(mechanism), model.stem)
     text = (
-        f'[machine]\nname = "{name}"\nmodel = {str(model.name)!r}\nnominal = "rough"\n\n'
+        f'[machine]\nname = "{name}"\nmodel = {json.dumps(model.name)}\nnominal = "rough"\n\n'
         f'[[replays]]\ntest = "{test}"\n'
     )
     machine, mistakes = examine_text(text, model)

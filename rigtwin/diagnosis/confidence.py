@@ -41,12 +41,8 @@ from rigtwin.numerics.arrays import Array
 
 STEEPNESS = 4.0
 """Exponent s of the logistic functions."""
-CLEAN = 8.0
-"""Ratio of what an effect explains to what remains from which it explains its part cleanly."""
 FORM_STEEPNESS = 8.0
 """Exponent of the logistic function of an effect that may correct the form of a law."""
-COMMON = 0.25
-"""Deviation of a form that a common effect corrects, relative to that of a rare one."""
 
 
 def _logistic(ratio: float, steepness: float = STEEPNESS) -> float:
@@ -103,15 +99,16 @@ def _share_of(effect: Effect, posterior: HypothesisPosterior) -> float:
     return math.sqrt(max(float(returned), 0.0) / gap) if gap > 0.0 else 0.0
 
 
-def _corrects_form(share: float, expected: float, remains: float) -> float:
+def _corrects_form(share: float, expected: float, remains: float, clean: float) -> float:
     """Return the probability that an effect only corrects the form of the other laws.
 
     `share` is that of the gap's amplitude that returns without the effect, `remains` that which is
-    left with it, and `expected` the deviation of a law's form.
+    left with it, `expected` the deviation of a law's form, and `clean` the ratio of both shares at
+    which an effect explains its part cleanly.
     """
     share = max(share, 1e-9)
     small = _logistic(expected / share, FORM_STEEPNESS)
-    return small * _logistic(CLEAN * remains / share)
+    return small * _logistic(clean * remains / share)
 
 
 def support_of(
@@ -148,8 +145,10 @@ def support_of(
     )
     form = 0.0
     if len(best.fit.effects) > 1:
-        expected = evidence.machine.prior.form * (1.0 if is_rare(effect) else COMMON)
-        form = _corrects_form(_share_of(effect, posterior), expected, remains)
+        expected = evidence.machine.prior.form
+        expected *= 1.0 if is_rare(effect) else thresholds.common_form
+        share = _share_of(effect, posterior)
+        form = _corrects_form(share, expected, remains, thresholds.clean_ratio)
     resembles = unnamed * _logistic(remains / thresholds.mimicry_share)
     return Support(
         probability=posterior.inclusion(effect),

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigtwin.components import PUSHERS, ForceActuator
+from rigtwin.components import PUSHERS, ForceActuator, Guide
 from rigtwin.description.machine import Machine, ReplayOf, Row
 from rigtwin.diagnosis.units import say
 from rigtwin.diagnosis.words import name_part
@@ -111,8 +111,8 @@ def _stands(
     guides = [
         name
         for name, known in components.items()
-        if known.element == "joint" and name == replay.guide
-    ] or [name for name, known in components.items() if known.mjcf == joint and not known.channel]
+        if known.joint == joint and isinstance(getattr(plant, name), Guide)
+    ]
     if len(pushers) != 1 or not guides:
         return None
     channel = components[pushers[0]].channel
@@ -125,7 +125,7 @@ def _stands(
             return None
         travels.append(float(np.ptp(position)))
         pushes.append(_push(getattr(plant, pushers[0]), recording.column(*channel), position))
-    held = float(getattr(getattr(plant, guides[0]), "coulomb", 0.0))
+    held = float(getattr(plant, guides[0]).coulomb)
     if max(pushes) <= PUSHED * held or max(pushes) == 0.0:
         return None
     return Standstill(row.name, guides[0], pushers[0], max(pushes), max(travels))

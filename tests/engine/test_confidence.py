@@ -124,7 +124,7 @@ def test_the_support_of_an_effect_is_written_out(off, reach, rest):
 def test_a_rare_effect_that_explains_little_may_correct_the_form_of_a_law(share, remains):
     """m = 1/(1 + (a/form)^8) · L(8 · remains/a)."""
     expected = 1.0 / (1.0 + (share / FORM) ** 8) * logistic(8.0 * remains / share)
-    assert _corrects_form(share, FORM, remains) == pytest.approx(expected)
+    assert _corrects_form(share, FORM, remains, 8.0) == pytest.approx(expected)
 
 
 def test_the_share_of_an_effect_is_what_returns_without_it():
