@@ -12,15 +12,15 @@ is the probability of a mimic, s the steepness of the logistic function L, rest 
 noise, excess that beyond noise and declared error, and remains the share of the gap that is not
 closed. L is smooth, so that no small change of the data turns a confident answer around.
 
-An effect may also correct the form of a law: real friction and real springs differ a little from
-those of the library, and what differs resembles a small play, compliance or lag. Its mimic has at
-least the probability
+A rare effect may also correct the form of a law: real friction and real springs differ a little
+from those of the library, and what differs resembles a small play, compliance or lag. Its mimic has
+at least the probability
 
     1 / (1 + (a / form)^8) · L(clean · remains / a),
 
 where a is the share of the gap's amplitude that returns without the effect, and form the deviation
-of a law's form that is expected: `ModelPrior.form`, or a quarter of it for effects that are not
-rare. A true effect explains its part cleanly: with it, far less remains than it explains.
+of a law's form that is expected (`ModelPrior.form`). A true effect explains its part cleanly: with
+it, far less remains than it explains.
 """
 
 from __future__ import annotations
@@ -100,7 +100,7 @@ def _share_of(effect: Effect, posterior: HypothesisPosterior) -> float:
 
 
 def _corrects_form(share: float, expected: float, remains: float, clean: float) -> float:
-    """Return the probability that an effect only corrects the form of the other laws.
+    """Return the probability that a rare effect only corrects the form of the other laws.
 
     `share` is that of the gap's amplitude that returns without the effect, `remains` that which is
     left with it, `expected` the deviation of a law's form, and `clean` the ratio of both shares at
@@ -144,10 +144,8 @@ def support_of(
         posterior.residual_excess / thresholds.residual_excess
     )
     form = 0.0
-    if len(best.fit.effects) > 1:
-        expected = evidence.machine.prior.form
-        expected *= 1.0 if is_rare(effect) else thresholds.common_form
-        share = _share_of(effect, posterior)
+    if is_rare(effect) and len(best.fit.effects) > 1:
+        share, expected = _share_of(effect, posterior), evidence.machine.prior.form
         form = _corrects_form(share, expected, remains, thresholds.clean_ratio)
     resembles = unnamed * _logistic(remains / thresholds.mimicry_share)
     return Support(

@@ -106,9 +106,6 @@ class Thresholds:
     clean_ratio: float = 8.0
     """Ratio of what an effect explains to what remains with it, from which it explains its part
     cleanly and corrects no form of another law."""
-    common_form: float = 0.25
-    """Deviation of a law's form that a common effect may correct, relative to that of a rare one
-    (`ModelPrior.form`)."""
     worsening_factor: float = 1.05
     """Factor of the residual's power on held-out data above which a correction is rejected."""
     controller_consequence: float = 1e-3

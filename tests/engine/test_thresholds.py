@@ -37,7 +37,6 @@ WORDS = {
     "removed_share": 0.106,
     "mimicry_share": 0.17,
     "clean_ratio": 8.0,
-    "common_form": 0.25,
     "worsening_factor": 1.05,
     "controller_consequence": 1e-3,
     "highest_confidence": 0.98,
