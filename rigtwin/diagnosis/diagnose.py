@@ -16,13 +16,14 @@ from rigtwin.components import Effect, with_parameters
 from rigtwin.components.plant import Plant
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import OWN, Machine
+from rigtwin.diagnosis.confounding import find_confounded
 from rigtwin.diagnosis.contacts import find_contacts
 from rigtwin.diagnosis.controller import ControllerReplay, Deviation
 from rigtwin.diagnosis.copies import drop_copies, refuse_copies
 from rigtwin.diagnosis.cross_validation import Validation, gap_level, validate, with_effects
 from rigtwin.diagnosis.data_checks import SHORTEST, SHORTEST_PART, find_faults, require_fit
 from rigtwin.diagnosis.evidence import Evidence
-from rigtwin.diagnosis.explain import Explanation, explain
+from rigtwin.diagnosis.explain import Explanation, candidates, explain
 from rigtwin.diagnosis.finding import (
     Answer,
     Finding,
@@ -325,6 +326,7 @@ def _diagnose_part(
         if disturbances
         else (),
         traces=find_traces(explanation, named, evidence, thresholds) if has_gap else (),
+        confounded=find_confounded(evidence, explanation.fit, named, candidates(evidence)),
         nearest=find_nearest(explanation, evidence) if verdict == "unknown" else None,
         energy=_energy(evidence),
     )

@@ -66,11 +66,14 @@ class Rival:
         Values that the rival takes when it replaces the named effect.
     probability
         Weight of all hypotheses that contain the rival.
+    beside
+        Other named effects whose values differ beside the rival, and these values.
     """
 
     name: Name
     parameters: dict[str, Estimate]
     probability: float
+    beside: tuple[tuple[Name, dict[str, Estimate]], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -110,6 +113,31 @@ class Finding:
     support: Support | None = None
     rivals: tuple[Rival, ...] = ()
     curve: tuple[tuple[float, float], ...] = ()
+
+
+@dataclass(frozen=True)
+class Confounded:
+    """Declared value that the data determine only together with fitted ones.
+
+    Attributes
+    ----------
+    assumed
+        Kind and component of the declared value.
+    value, unit
+        Declared value and its unit.
+    exponents
+        Named effect and its exponent e: it changes as the declared value to the power of e.
+    """
+
+    assumed: Name
+    value: float
+    unit: str
+    exponents: tuple[tuple[Name, float], ...]
+
+    def document(self) -> dict[str, Any]:
+        """Return the entry as JSON has it."""
+        exponents = [{**asdict(name), "exponent": power} for name, power in self.exponents]
+        return {**asdict(self.assumed), "value": self.value, "unit": self.unit, "with": exponents}
 
 
 @dataclass(frozen=True)
@@ -305,6 +333,9 @@ class Answer:
         Locations of the residual that the corrected twin does not model.
     traces
         Effects that would close a little more of the gap, but too little to be named.
+    confounded
+        Declared values on which the named ones depend, because the data determine only
+        combinations of both.
     nearest
         Best explanation of an unknown gap. None for every other verdict.
     energy
@@ -328,6 +359,7 @@ class Answer:
     units: dict[str, str] = field(default_factory=dict)
     leftovers: tuple[Place, ...] = ()
     traces: tuple[Finding, ...] = ()
+    confounded: tuple[Confounded, ...] = ()
     nearest: Nearest | None = None
     energy: dict[str, EnergyError] = field(default_factory=dict)
 
@@ -352,6 +384,7 @@ class Answer:
             "steps": [step.document() for step in self.steps],
             "units": dict(self.units),
             "leftovers": [asdict(place) for place in self.leftovers],
+            "confounded": [entry.document() for entry in self.confounded],
             "nearest": None if self.nearest is None else _nearest_document(self.nearest),
             # JSON has no number for an infinite share.
             "energy": {
@@ -390,6 +423,13 @@ def _finding_document(effect: Finding) -> dict[str, Any]:
                 "kind": rival.name.kind,
                 "parameters": {name: asdict(value) for name, value in rival.parameters.items()},
                 "probability": rival.probability,
+                "beside": [
+                    {
+                        **asdict(name),
+                        "parameters": {key: asdict(value) for key, value in values.items()},
+                    }
+                    for name, values in rival.beside
+                ],
             }
             for rival in effect.rivals
         ],

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from rigtwin.components import Effect, find, title
+from rigtwin.components import UNLIMITED, Effect, find, title
 from rigtwin.components.effect import Points
 from rigtwin.components.plant import Plant
 from rigtwin.diagnosis.confidence import support_of
@@ -17,6 +17,7 @@ from rigtwin.diagnosis.finding import Estimate, Finding, Name, Nearest, Rival, U
 from rigtwin.diagnosis.fit import Fit
 from rigtwin.diagnosis.posterior import HypothesisPosterior
 from rigtwin.diagnosis.sampling import SensorProperty
+from rigtwin.diagnosis.scoring import Scored
 from rigtwin.diagnosis.support import Support
 from rigtwin.diagnosis.text import format_distinct
 from rigtwin.diagnosis.thresholds import STANDARD, Thresholds
@@ -27,6 +28,8 @@ WIDEST = 0.9
 Widening alone therefore never makes an interval hold the nominal value."""
 TRACE_WEIGHT = 1e-3
 """Weight from which a hypothesis with one more effect makes that effect a trace."""
+TRACE_SHARE = 0.005
+"""Share of the gap that the effects of a trace must close together."""
 READING_ERROR = 0.05
 """Half interval of a sensor property that is read off the signal, as a share of its value."""
 SETTING_ERROR = 1e-3
@@ -64,8 +67,8 @@ def choose_named(
     """Choose the effects of the best hypothesis that are named.
 
     An effect is named if the probability that it or one of its rivals is present is at least
-    `Thresholds.nameable`. The rivals count together, because the finding lists them all. An effect
-    with too many rivals is not named: the finding would say little.
+    `Thresholds.naming_confidence`. The rivals count together, because the finding lists them all.
+    An effect with too many rivals is not named: the finding would say little.
 
     Parameters
     ----------
@@ -167,15 +170,32 @@ def _describe_rival(
     rival: Effect, effect: Effect, explanation: Explanation, evidence: Evidence
 ) -> Rival:
     """Describe a rival with its values in the best hypothesis that has it instead of an effect."""
+    best, probability = explanation.posterior.best, explanation.posterior.inclusion(rival)
     rest = set(explanation.fit.effects) - {effect}
     for hypothesis in explanation.posterior.ranking:
-        fit = hypothesis.scored.fit
-        if rival in fit.effects and rest <= set(fit.effects):
-            number = fit.effects.index(rival)
-            widths = hypothesis.scored.widths[number]
-            values = estimates(rival, fit.values[number], widths, evidence)
-            return Rival(_name(rival), values, explanation.posterior.inclusion(rival))
-    return Rival(_name(rival), {}, explanation.posterior.inclusion(rival))
+        scored = hypothesis.scored
+        if rival in scored.fit.effects and rest <= set(scored.fit.effects):
+            beside = []
+            for member in scored.fit.effects:
+                with_rival = _estimates_in(scored, member, evidence)
+                if member in rest and _differ(with_rival, _estimates_in(best, member, evidence)):
+                    beside.append((_name(member), with_rival))
+            values = _estimates_in(scored, rival, evidence)
+            return Rival(_name(rival), values, probability, tuple(beside))
+    return Rival(_name(rival), {}, probability)
+
+
+def _estimates_in(scored: Scored, effect: Effect, evidence: Evidence) -> dict[str, Estimate]:
+    number = scored.fit.effects.index(effect)
+    return estimates(effect, scored.fit.values[number], scored.widths[number], evidence)
+
+
+def _differ(first: dict[str, Estimate], second: dict[str, Estimate]) -> bool:
+    """Return whether the intervals of two estimates of one effect have nothing in common."""
+    return any(
+        first[name].low > second[name].high or first[name].high < second[name].low
+        for name in first.keys() & second.keys()
+    )
 
 
 def _standard_errors(
@@ -185,14 +205,14 @@ def _standard_errors(
 
     The standard error of a value is
 
-        sqrt(max(s_cv, s_fit)^2 + s_hypotheses^2 + b^2),    b = aligned / d · |value - nominal|,
+        sqrt(max(s_cv, s_fit)^2 + s_hypotheses^2 + b^2),    b = c / d · |value - nominal|,
 
     with the standard errors of cross-validation and of the final fit, the spread of the value over
     all hypotheses, and the bias b that the unexplained residual may cause. A residual whose
     amplitude is 1/d of the effect's response shifts the magnitude by 1/d times the correlation of
-    both, of which only the usual size (`Thresholds.aligned`) is known. The bias widens the interval
-    but does not lower the confidence: `Support.mimic` covers an effect that merely resembles the
-    residual.
+    both, of which only the usual size c (`Thresholds.rest_correlation`) is known. The bias widens
+    the interval but does not lower the confidence: `Support.mimic` covers an effect that merely
+    resembles the residual.
     """
     posterior, errors = explanation.posterior, []
     for effect, values, scored, fitted in zip(
@@ -204,14 +224,26 @@ def _standard_errors(
     ):
         parts = zip(scored, fitted, posterior.spread(effect), strict=True)
         formal = [math.hypot(max(held_out, fit), spread) for held_out, fit, spread in parts]
-        # Several magnitudes are the coefficients of one force, which the bias shifts as a whole.
-        distance = max(effect.distances(values, posterior.nominal))
+        distance = _largest_change(effect, values, posterior.nominal)
         bias = thresholds.rest_correlation / support[effect].dominance * distance
         widest = WIDEST * distance / thresholds.interval_half_width
         count = effect.kind.magnitudes
         widened = [min(math.hypot(width, bias), max(width, widest)) for width in formal[:count]]
         errors.append((*widened, *formal[count:]))
     return errors
+
+
+def _largest_change(effect: Effect, values: Sequence[float], nominal: Plant) -> float:
+    """Return the largest distance of an effect's magnitudes from nominal.
+
+    Several magnitudes are the coefficients of one force, which a bias shifts as a whole. A limit
+    that the nominal machine lacks is compared with zero.
+    """
+    magnitudes = values[: effect.kind.magnitudes]
+    return max(
+        abs(value) if distance > 0.5 * UNLIMITED else distance
+        for value, distance in zip(magnitudes, effect.distances(values, nominal), strict=True)
+    )
 
 
 def _shares(
@@ -270,6 +302,8 @@ def find_traces(
             continue
         additional = [effect for effect in scored.fit.effects if effect not in named_set]
         gained = posterior.closes(scored) - posterior.closes(posterior.best)
+        if gained < TRACE_SHARE:
+            continue
         return tuple(
             Finding(
                 name=_name(effect),

@@ -40,7 +40,7 @@ START_SHORTFALL = 0.5
 """A start is refined if it gains at most this share less than the best start."""
 LIMITS = ("saturation", "rate_limit", "resonance", "force_limit")
 """Kinds whose response does not scale with their magnitude."""
-CACHED_RESPONSES = 64
+CACHED_RESPONSES = 256
 """Number of cached responses beside a fit."""
 SMALL_START = 0.05
 """Share of the smallest start at which an effect is simulated as well."""

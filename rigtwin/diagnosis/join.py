@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import TypeVar
 
@@ -17,9 +17,11 @@ import numpy as np
 from rigtwin.components.plant import Plant
 from rigtwin.diagnosis.cross_validation import gap_level
 from rigtwin.diagnosis.evidence import Evidence, relative_errors
-from rigtwin.diagnosis.finding import Answer, Gap, Interval, Step, Verdict
+from rigtwin.diagnosis.finding import Answer, Finding, Gap, Interval, Step, Verdict
 from rigtwin.diagnosis.result import Diagnosis
 from rigtwin.diagnosis.text import sentence
+from rigtwin.diagnosis.units import write
+from rigtwin.diagnosis.words import enumerate_words
 
 Item = TypeVar("Item")
 RANKED = 2
@@ -73,7 +75,7 @@ def join(
         gap=gap,
         ranking=tuple(_unique(answer.ranking[:RANKED] for answer in answers)),
         not_observable=tuple(_unique(answer.not_observable for answer in answers)),
-        notes=tuple(_unique(answer.notes for answer in answers)),
+        notes=(*_unique(answer.notes for answer in answers), *_describe_shared_delay(effects)),
         recordings=answers[0].recordings,
         seconds=time.perf_counter() - started,
         machine=evidence.machine.name,
@@ -81,12 +83,30 @@ def join(
         units={name: unit for answer in answers for name, unit in answer.units.items()},
         leftovers=tuple(place for answer in answers for place in answer.leftovers),
         traces=tuple(trace for answer in answers for trace in answer.traces),
+        confounded=tuple(entry for answer in answers for entry in answer.confounded),
         nearest=next((answer.nearest for answer in answers if answer.nearest), None)
         if verdict == "unknown"
         else None,
     )
     otherwise = tuple(pair for part in parts for pair in part.otherwise)
     return Diagnosis(answer, evidence.machine, evidence, corrected, otherwise, held_out)
+
+
+def _describe_shared_delay(effects: Sequence[Finding]) -> Iterator[str]:
+    """Say where delays of several parts agree, as one delay of the computer would make them."""
+    delays = {
+        effect.name.component: effect.parameters["delay"]
+        for effect in effects
+        if effect.name.kind == "delay"
+    }
+    low = max((delay.low for delay in delays.values()), default=0.0)
+    high = min((delay.high for delay in delays.values()), default=0.0)
+    if len(delays) > 1 and low <= high:
+        mean = sum(delay.value for delay in delays.values()) / len(delays)
+        yield (
+            f"the delays of {enumerate_words([*delays])} agree within their intervals: they may be "
+            f"one delay of {write(mean, 's')} that all commands share"
+        )
 
 
 def _unique(groups: Iterable[Iterable[Item]]) -> list[Item]:

@@ -215,10 +215,12 @@ class HypothesisPosterior:
         return min(min(costs, default=math.inf) - self.ranking[0].cost, 1e6)
 
     def spread(self, effect: Effect) -> tuple[float, ...]:
-        """Return the standard deviation of an effect's values over all hypotheses with it.
+        """Return the standard deviation of an effect's values over comparable hypotheses with it.
 
         It is taken about the values of the best hypothesis. It adds the uncertainty of the
-        hypothesis to that of the fit.
+        hypothesis to that of the fit. A hypothesis is comparable if it contains those effects of
+        the best one that have rivals: with a rival in their place, all other values may differ,
+        and the finding says which they are (`Rival.beside`).
 
         Parameters
         ----------
@@ -233,9 +235,10 @@ class HypothesisPosterior:
         number = self.best.fit.effects.index(effect)
         chosen = np.array(self.best.fit.values[number])
         variance, weight = np.zeros(len(chosen)), 0.0
+        contested = {member for member in self.best.fit.effects if self.rivals(member)}
         for hypothesis in self.ranking:
             fit = hypothesis.scored.fit
-            if effect in fit.effects:
+            if {effect, *contested} <= {*fit.effects}:
                 values = fit.values[fit.effects.index(effect)]
                 variance += hypothesis.weight * (np.array(values) - chosen) ** 2
                 weight += hypothesis.weight

@@ -42,6 +42,8 @@ ELUSIVE = ("payload",)
 the zero or the friction of several joints."""
 CONTAINS_SIMPLER = ("two_lags", "mount", "deadband_asymmetry")
 """Kinds that become a simpler kind at an end of their range."""
+WEIGHED = ("mass", "inertia")
+"""Kinds that change a mass or a moment of inertia by a factor."""
 SIMPLER_PARAMETERS = 0.5
 """Number of parameters that a kind containing a simpler one costs in addition."""
 NOMINAL_DISTANCE = 0.25
@@ -128,6 +130,7 @@ class Prices:
             self._price_cancelling(scored)
             + self._price_immaterial(scored)
             + self._price_unsteady(scored)
+            + self._price_masses(scored)
         )
 
     def _price_cancelling(self, scored: Scored) -> float:
@@ -188,6 +191,19 @@ class Prices:
                 change = effect.distances(values, self._fitter.plant)[0]
                 within = t.tolerance_half_widths - change / max(width, 1e-300)
                 price += t.prohibitive_price * float(np.clip(within, 0.0, 1.0))
+        return price
+
+    def _price_masses(self, scored: Scored) -> float:
+        """Return the price of changed masses, ½ (ln(m / m_0) / mass_log_error)², summed.
+
+        Where the data determine only the ratio of a gain to a mass, this makes the gain likelier.
+        """
+        price = 0.0
+        for effect, values in zip(scored.fit.effects, scored.fit.values, strict=True):
+            nominal = self._nominal(effect)
+            if effect.kind.name in WEIGHED and nominal > 0.0 and values[0] > 0.0:
+                deviation = math.log(values[0] / nominal) / self._thresholds.mass_log_error
+                price += 0.5 * deviation**2
         return price
 
     def _nominal(self, effect: Effect) -> float:

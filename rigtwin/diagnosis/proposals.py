@@ -33,6 +33,8 @@ ELSEWHERE = 6
 """Rank among the resembling effects up to which the same kind at another component is tried."""
 LARGEST_SHARE = 3.0
 """Largest share of a simulated response that a linear estimate uses."""
+SMALL_PART = 0.05
+"""Share of an effect that is taken away for its local response."""
 LATE = ("lag", "delay", "two_lags", "resonance")
 """Kinds that delay a signal."""
 
@@ -175,12 +177,13 @@ def propose_replacements(
     residual = fitter.residual_at(fit)
     for number, (effect, remaining, values) in enumerate(leave_one_out(fit)):
         without = fitter.evidence.residual(with_values(fitter.plant, remaining, values))
-        response = without - residual
+        targets = (without - residual, _local_response(fitter, fit, number, residual))
 
         def resemble(
-            candidate: Effect, response: Array = response
+            candidate: Effect, targets: tuple[Array, ...] = targets
         ) -> tuple[float, Effect, tuple[float, ...]]:
-            return _resemble(fitter, fit, candidate, response)
+            whole, local = (_resemble(fitter, fit, candidate, target) for target in targets)
+            return whole if whole[0] >= local[0] else local
 
         possible = [
             candidate
@@ -203,6 +206,23 @@ def propose_replacements(
             for candidate in exclusive[:count]
         ]
     return starts
+
+
+def _local_response(fitter: Fitter, fit: Fit, number: int, residual: Array) -> Array:
+    """Return the response to one effect of a fit, extrapolated from a small part of it.
+
+    The whole response of damping that tames a resonance, for example, resembles nothing: the
+    machine oscillates without it. A small part of it resembles that of any other damping.
+    """
+    effect, values = fit.effects[number], list(fit.values)
+    nominal = effect.nominal(fitter.plant)
+    names = effect.kind.parameters[: effect.kind.magnitudes]
+    nearer = list(values[number])
+    for place, name in enumerate(names):
+        nearer[place] += SMALL_PART * (nominal[name] - nearer[place])
+    values[number] = tuple(nearer)
+    moved = fitter.evidence.residual(with_values(fitter.plant, fit.effects, values))
+    return (moved - residual) / SMALL_PART
 
 
 def _resemble(

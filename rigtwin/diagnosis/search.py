@@ -59,6 +59,8 @@ COMPARED = 5
 """Number of effects tried in the place of each effect of the best hypothesis at the end."""
 BEGINNINGS = 4
 """Number of single effects that are extended where the best hypothesis leaves a large residual."""
+SHORT = 4
+"""Number of effects up to which the variants of every leader are fitted."""
 STEADY_ROUNDS = 2
 """Rounds without a better hypothesis after which the search ends."""
 
@@ -123,16 +125,21 @@ class HypothesisSearch:
         """
         singles = self._fit_singles()
         if self._has_gap(singles):
+            # Several free joints: the gain of one servo may resemble the friction of all joints, so
+            # the regular effects are fitted together before any climb begins with such a gain.
+            coupled = any(len(replay.free) > 1 for replay in self.evidence.machine.replays)
+            if coupled:
+                self._fit_regulars()
             # The cheapest single effect may explain one signal alone, so the single effect of least
             # misfit over all signals is extended as well. So is dry friction: in series with a
             # spring or a play it explains little by itself.
             dry = [fit for fit in singles if fit.effects[0].kind.name == GATEWAY]
-            for fit in (singles[0], *dry[:1]):
+            for fit in () if len(self.posterior.best.fit.effects) > 1 else (singles[0], *dry[:1]):
                 fresh = frozenset(fit.effects) not in self._extended
                 if fresh and self.posterior.has_unexplained_residual:
                     self._extend(fit)
             self._climb()
-            if (
+            if not coupled and (
                 self.posterior.has_unexplained_residual
                 or len(self.posterior.best.fit.effects) > 1
                 or self._has_free_joint()
@@ -140,8 +147,10 @@ class HypothesisSearch:
                 self._fit_regulars()
                 self._climb()
             if self.posterior.has_unexplained_residual:
+                before = self.posterior.best
                 self._restart()
-                self._climb()
+                if self._improved(before) or len(before.fit.effects) <= SHORT:
+                    self._climb()
             self._vary_best()
         return self.posterior
 
@@ -237,7 +246,9 @@ class HypothesisSearch:
             if not self._improved(before):
                 if not self.posterior.has_unexplained_residual:
                     return
-                self._vary(leader, VARIED)
+                # A long hypothesis has many variants: only those of the best one are worth a fit.
+                if leader == before.fit or len(leader.effects) <= SHORT:
+                    self._vary(leader, VARIED)
             steady = 0 if self._improved(before) else steady + 1
 
     def _improved(self, before: Scored) -> bool:

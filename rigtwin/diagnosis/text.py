@@ -5,7 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from rigtwin.diagnosis.advice import advise
-from rigtwin.diagnosis.finding import Answer, Estimate, Finding, Gap, Place, Verdict
+from rigtwin.diagnosis.finding import (
+    Answer,
+    Confounded,
+    Estimate,
+    Finding,
+    Gap,
+    Place,
+    Rival,
+    Verdict,
+)
 from rigtwin.diagnosis.units import shorten, spell, write
 from rigtwin.diagnosis.words import enumerate_words, indefinite_article, name_part
 
@@ -17,6 +26,8 @@ UNBOUNDED = 1e9
 """Nominal values from this magnitude on mean that the twin has no such limit."""
 GAP_TO_CLOSE = 1.05
 """Gap, in noise floors, from which the closed share of it is worth a sentence."""
+EXACT = 0.1
+"""Difference of an exponent from ±1 below which a value counts as proportional."""
 INTERVAL_NOTE = (
     "intervals: 2.5 standard errors to either side; "
     "docs/confidence.md says how often they hold the true value"
@@ -94,6 +105,8 @@ def _effect_lines(diagnosis: Answer) -> Iterator[str]:
             yield f"    force at a position: {_list_curve(effect)}"
         if effect.rivals:
             yield f"    these data cannot distinguish it from {_list_rivals(effect)}"
+    for entry in diagnosis.confounded:
+        yield f"  {_describe_confounded(entry)}"
     if (nearest := diagnosis.nearest) is not None:
         names = " + ".join(str(name) for name in nearest.names)
         yield (
@@ -169,15 +182,39 @@ def _curve_units(effect: Finding) -> tuple[str, str]:
 
 
 def _list_rivals(effect: Finding) -> str:
-    """List the rivals of an effect, with the values that they would have."""
-    return enumerate_words(
-        [
-            f"{rival.name} ({_list_values(rival.parameters)})"
-            if rival.parameters
-            else str(rival.name)
-            for rival in effect.rivals
-        ]
+    """List the rivals of an effect, with the values that they and others would have."""
+    return enumerate_words([_describe_rival(rival) for rival in effect.rivals])
+
+
+def _describe_rival(rival: Rival) -> str:
+    if not rival.parameters:
+        return str(rival.name)
+    others = [f"{name} with {_list_values(values)}" for name, values in rival.beside]
+    beside = f", beside {enumerate_words(others)}" if others else ""
+    return f"{rival.name} ({_list_values(rival.parameters)}{beside})"
+
+
+def _describe_confounded(entry: Confounded) -> str:
+    """Describe how the named values depend on a declared one, by the exponents' size."""
+    proportional = [str(name) for name, power in entry.exponents if abs(power - 1.0) < EXACT]
+    inverse = [str(name) for name, power in entry.exponents if abs(power + 1.0) < EXACT]
+    clauses = []
+    if proportional:
+        clauses.append(f"{enumerate_words(proportional)} {_is(proportional)} proportional to it")
+    if inverse:
+        clauses.append(f"{enumerate_words(inverse)} {_is(inverse)} inversely proportional to it")
+    for name, power in entry.exponents:
+        if abs(abs(power) - 1.0) >= EXACT:
+            clauses.append(f"{name} changes by {power:+.2g} % with each percent of it")
+    declared = write(entry.value, entry.unit)
+    return (
+        f"these values hold if {entry.assumed} is {declared}, which the data do not show: "
+        f"{enumerate_words(clauses)}"
     )
+
+
+def _is(names: Sequence[str]) -> str:
+    return "is" if len(names) == 1 else "are"
 
 
 def sentence(verdict: Verdict, effects: Sequence[Finding], where: Sequence[Place], gap: Gap) -> str:

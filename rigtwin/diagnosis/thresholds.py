@@ -62,6 +62,9 @@ class Thresholds:
     """Price of a magnitude that is one standard error short of `steady_standard_errors`, nats. The
     price grows with the square of the shortfall, and steeply once the interval contains the nominal
     value."""
+    mass_log_error: float = 0.25
+    """Standard deviation of the logarithm of a declared mass or moment of inertia. A mass is drawn
+    or weighed, so that it is seldom wrong by a factor, as a gain may be."""
     prohibitive_price: float = 50.0
     """Highest price of an effect that is immaterial, cancelled by another effect, or smaller than
     its declared tolerance, nats."""

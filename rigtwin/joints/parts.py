@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from rigtwin.description.machine import Component, Machine
+from rigtwin.description.machine import Component, Machine, ReplayOf, Row
 
 
 def parts(machine: Machine) -> tuple[Machine, ...]:
@@ -44,15 +44,36 @@ def _changes(machine: Machine, component: Component) -> set[str]:
     effects = [effect for effect in machine.effects() if effect.group == component.name]
     if not effects:
         return set()
-    if component.name in {mover for replay in machine.replays for mover in replay.moved_by}:
-        # Another motion of one joint changes the forces of all joints.
-        return {row.name for row in machine.rows if any(effect.searched for effect in effects)}
-    if component.element == "body":
-        return {row.name for row in machine.rows}
-    if component.element == "sensor":
+    moved = [replay for replay in machine.replays if component.name in replay.moved_by]
+    if moved:
+        # Another motion of one joint changes the forces of all joints that act on each other.
+        searched = any(effect.searched for effect in effects)
+        return {row.name for replay in moved for row in replay.rows if searched}
+    names = {row.name for row in machine.rows}
+    if component.element == "sensor" and component.name in names:
         return {component.name}
-    joints = {joint for joint, _ in component.acts_on}
-    return {row.name for row in machine.rows if machine.components[row.name].joint in joints}
+    joints = {component.joint, *(joint for joint, _ in component.acts_on)}
+    # A body's inertia, and a sensor that is not a signal itself, act on all signals of a replay.
+    shared = component.element in ("body", "sensor")
+    return {
+        row.name
+        for replay in machine.replays
+        for row in replay.rows
+        if joints & (_joints_of(machine, replay) if shared else _joint_of(machine, replay, row))
+    }
+
+
+def _joints_of(machine: Machine, replay: ReplayOf) -> set[str | None]:
+    """Return the joints that a replay moves or observes."""
+    components = [machine.components[name] for name in replay.moved_by]
+    moved = {joint for component in components for joint, _ in component.acts_on}
+    return moved.union(*(_joint_of(machine, replay, row) for row in replay.rows))
+
+
+def _joint_of(machine: Machine, replay: ReplayOf, row: Row) -> set[str | None]:
+    """Return the joint of a signal; a signal computed from several is that of its replay."""
+    component = machine.components.get(row.name)
+    return {replay.joint.name if component is None else component.joint}
 
 
 def _only(machine: Machine, signals: set[str]) -> Machine:
@@ -68,6 +89,7 @@ def _only(machine: Machine, signals: set[str]) -> Machine:
         replays=tuple(
             replace(replay, rows=tuple(row for row in replay.rows if row.name in signals))
             for replay in machine.replays
+            if any(row.name in signals for row in replay.rows)
         ),
         components={
             name: component if name in doubted else replace(component, kinds=no_kinds)

@@ -68,6 +68,11 @@ class IndependentJoints(Physics):
     ) -> tuple[str, ...]:
         return overlooked(mechanism, components, tuple(replays))
 
+    def split(self, machine: Machine) -> tuple[Machine, ...]:
+        from rigtwin.joints.parts import parts
+
+        return parts(machine)
+
     def model(
         self, machine: Machine, inputs: Inputs, configuration: Configuration, steps: int
     ) -> Model[Any]:
@@ -222,11 +227,6 @@ class PrescribedJoints(IndependentJoints):
 
     def claims(self, types: Mapping[str, type], replays: Sequence[ReplayOf]) -> bool:
         return any(len(replay.moved_by) > 1 and not replay.free for replay in replays)
-
-    def split(self, machine: Machine) -> tuple[Machine, ...]:
-        from rigtwin.joints.parts import parts
-
-        return parts(machine)
 
     def model(
         self, machine: Machine, inputs: Inputs, configuration: Configuration, steps: int

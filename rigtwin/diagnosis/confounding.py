@@ -1,0 +1,115 @@
+"""Confounded parameters: declared values that the data determine only together with fitted ones.
+
+Let δ be the whitened response to a relative change of a declared value p, and J the responses to
+relative changes of the fitted values q, both free of what the tolerances absorb. If
+
+    |δ + J e| ≪ |δ|    with e = −(JᵀJ)⁻¹ Jᵀ δ,
+
+then a change of p is undone by the changes d ln q_i = e_i d ln p. The data determine only the
+combinations q_i · p^−e_i, such as the ratio of a friction to a mass in a free swing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from rigtwin.components import Effect
+from rigtwin.diagnosis.evidence import Evidence
+from rigtwin.diagnosis.finding import Confounded, Name
+from rigtwin.diagnosis.fit import Fit, clashes, with_values
+from rigtwin.diagnosis.space import Space
+from rigtwin.numerics.arrays import Array
+
+SCALING = ("mass", "gain", "position_gain")
+"""Kinds that scale all forces or motions of a joint, so that others may undo them."""
+STEP = 0.02
+"""Relative change of each value."""
+UNDONE = 0.1
+"""Share of the response to a declared value that fitted values leave where they undo it."""
+CHANGE, VISIBLE = 0.1, 60.0
+"""A declared value counts if a relative change of `CHANGE` changes the data by this chi-square."""
+INVOLVED = 0.1
+"""Smallest exponent of a fitted value that is reported."""
+
+
+def find_confounded(
+    evidence: Evidence, fit: Fit, named: Sequence[Effect], candidates: Sequence[Effect]
+) -> tuple[Confounded, ...]:
+    """Find the declared values on which the fitted ones depend.
+
+    Parameters
+    ----------
+    evidence
+        Recordings that were fitted.
+    fit
+        Best hypothesis.
+    named
+        Effects that are named.
+    candidates
+        Effects of the machine.
+
+    Returns
+    -------
+    tuple of Confounded
+        One entry for each declared value whose change the fitted values would undo.
+    """
+    searched = evidence.thin()
+    scaling = [
+        effect
+        for effect in candidates
+        if effect.kind.name in SCALING
+        and not clashes(effect, fit.effects)
+        and _declared(effect, searched) > 0.0
+    ]
+    if not named or not scaling:
+        return ()
+    base = searched.residual(fit.plant)
+    responses = [_response(searched, fit, n, base) for n in range(len(fit.effects))]
+    jacobian = np.column_stack(responses)
+    confounded = []
+    for effect in scaling:
+        space = Space(searched, fit.plant, effects=(*fit.effects, effect))
+        value = _declared(effect, searched)
+        changed = with_values(fit.plant, (effect,), ((value * (1.0 + STEP),),))
+        response = (searched.residual(changed) - base) / STEP
+        projected = space.project_out(np.column_stack([jacobian, response]))
+        columns, target = projected[:, :-1], projected[:, -1]
+        if float(target @ target) * CHANGE**2 < VISIBLE:
+            continue
+        exponents = -np.linalg.lstsq(columns, target, rcond=None)[0]
+        if not _undoes(columns, exponents, target):
+            continue
+        # Columns that resemble each other share an exponent; the simple law is told if it holds.
+        simple = np.clip(np.round(exponents), -1.0, 1.0)
+        exponents = simple if _undoes(columns, simple, target) else exponents
+        involved = tuple(
+            (Name(member.component, member.kind.name), float(exponent))
+            for member, exponent in zip(fit.effects, exponents, strict=True)
+            if member in named and abs(exponent) > INVOLVED
+        )
+        if involved:
+            unit = searched.machine.unit(effect.group, next(iter(effect.quantities().values())))
+            name = Name(effect.component, effect.kind.name)
+            confounded.append(Confounded(name, value, unit, involved))
+    return tuple(confounded)
+
+
+def _undoes(columns: Array, exponents: Array, target: Array) -> bool:
+    """Return whether changes of the fitted values undo the response to a declared one."""
+    rest = target + columns @ exponents
+    return float(rest @ rest) <= UNDONE**2 * float(target @ target)
+
+
+def _declared(effect: Effect, evidence: Evidence) -> float:
+    return effect.nominal(evidence.plant)[effect.kind.parameters[0]]
+
+
+def _response(evidence: Evidence, fit: Fit, number: int, base: Array) -> Array:
+    """Return the whitened response to a relative change of the magnitudes of one effect."""
+    values, count = list(fit.values), fit.effects[number].kind.magnitudes
+    moved = [value * (1.0 + STEP) for value in values[number][:count]]
+    values[number] = (*moved, *values[number][count:])
+    plant = with_values(fit.base or evidence.plant, fit.effects, values)
+    return (evidence.residual(plant) - base) / STEP
