@@ -28,6 +28,9 @@ class ModelPrior:
     form
         Deviation of the library's laws from the forms that they have in the machine, as a share of
         the amplitude that they explain. A rare effect that explains less may only correct a form.
+    scale
+        Standard error, as a share of it, that no change of a parameter falls below: the declared
+        masses and gains, from which all forces and motions take their scale, are not exact.
     implausible_scale
         Ratio of a measured signal to its prediction, or its inverse, from which the unit of the
         recording is wrong rather than the gain of the machine.
@@ -37,14 +40,15 @@ class ModelPrior:
     even: float
     error: float
     form: float
+    scale: float
     implausible_scale: float
 
 
 PRIORS: Mapping[str, ModelPrior] = {
     prior.word: prior
     for prior in (
-        ModelPrior("known", 0.0, 0.02, 0.03, 5.0),
-        ModelPrior("rough", 1.0, 0.5, 0.14, inf),
+        ModelPrior("known", 0.0, 0.02, 0.03, 0.0, 5.0),
+        ModelPrior("rough", 1.0, 0.5, 0.14, 0.008, inf),
     )
 }
 """Word of the description → prior."""

@@ -205,16 +205,19 @@ def _standard_errors(
 
     The standard error of a value is
 
-        sqrt(max(s_cv, s_fit)^2 + s_hypotheses^2 + b^2),    b = c / d · |value - nominal|,
+        sqrt(max(s_cv, s_fit)^2 + s_hypotheses^2 + b^2),
+        b^2 = (c^2 / d^2 + s^2) (value - nominal)^2,
 
     with the standard errors of cross-validation and of the final fit, the spread of the value over
-    all hypotheses, and the bias b that the unexplained residual may cause. A residual whose
+    all hypotheses, and the bias b that the unexplained residual and the scale of the declared
+    parameters may cause. The latter is known to s (`ModelPrior.scale`). A residual whose
     amplitude is 1/d of the effect's response shifts the magnitude by 1/d times the correlation of
     both, of which only the usual size c (`Thresholds.rest_correlation`) is known. The bias widens
     the interval but does not lower the confidence: `Support.mimic` covers an effect that merely
     resembles the residual.
     """
     posterior, errors = explanation.posterior, []
+    scale = posterior.prior.scale
     for effect, values, scored, fitted in zip(
         explanation.fit.effects,
         explanation.fit.values,
@@ -225,7 +228,8 @@ def _standard_errors(
         parts = zip(scored, fitted, posterior.spread(effect), strict=True)
         formal = [math.hypot(max(held_out, fit), spread) for held_out, fit, spread in parts]
         distance = _largest_change(effect, values, posterior.nominal)
-        bias = thresholds.rest_correlation / support[effect].dominance * distance
+        share = math.hypot(thresholds.rest_correlation / support[effect].dominance, scale)
+        bias = share * distance
         widest = WIDEST * distance / thresholds.interval_half_width
         count = effect.kind.magnitudes
         widened = [min(math.hypot(width, bias), max(width, widest)) for width in formal[:count]]

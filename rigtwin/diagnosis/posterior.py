@@ -29,6 +29,7 @@ import numpy as np
 
 from rigtwin.components import Effect
 from rigtwin.components.plant import Plant
+from rigtwin.description.prior import ModelPrior
 from rigtwin.diagnosis.fitter import Fitter
 from rigtwin.diagnosis.prices import Prices
 from rigtwin.diagnosis.scoring import Scored
@@ -128,6 +129,11 @@ class HypothesisPosterior:
     def nominal(self) -> Plant:
         """Plant without any effect."""
         return self._fitter.plant
+
+    @property
+    def prior(self) -> ModelPrior:
+        """Prior belief in the nominal values of the machine."""
+        return self._fitter.evidence.machine.prior
 
     def levels(self, scored: Scored) -> Array:
         """Return the power of a held-out residual, in units of noise and declared error.
