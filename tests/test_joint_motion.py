@@ -14,7 +14,8 @@ from rigtwin.description.catalogue import find
 from rigtwin.description.machine import Machine
 from rigtwin.models.following import follow_command
 from rigtwin.models.joint import JointModel
-from rigtwin.models.joint_motion import Inertia, inverse_dynamics
+from rigtwin.models.joint_inverse import inverse_dynamics
+from rigtwin.models.joint_motion import Inertia
 from rigtwin.recording import Recording
 from rigtwin.signals.noise import smooth
 from tests.helpers.described import described, recording_of

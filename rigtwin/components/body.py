@@ -187,13 +187,13 @@ def turn_gravity(base: Base, gravity: Array) -> Array:
 
 
 def _displaced(context: Context) -> Starts:
-    reach = float(getattr(context.plant, context.effect.group).reach)
+    reach = float(context.component(Body).reach)
     values = [context.nominal + share * reach for share in (-0.2, -0.05, 0.05, 0.2)]
     return Starts.single(values, 0.005 * reach)
 
 
 def _loaded(context: Context) -> Starts:
-    body: Body = getattr(context.plant, context.effect.group)
+    body = context.component(Body)
     centre = np.array([body.centre_x, body.centre_y, body.centre_z])
     values = []
     for share in PAYLOADS:

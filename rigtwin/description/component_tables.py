@@ -142,6 +142,7 @@ class Components:
         channel, unit = self._find_channel(name, where, kind, table, turns)
         self.by_name[name] = Component(
             name=name,
+            component_type=TYPES[kind],
             element=element,
             mjcf=mjcf,
             joint=joint,
@@ -309,8 +310,9 @@ class Components:
                 self.mistakes.note(where, f"unknown key {key!r}; {suggest(key, known)}")
                 continue
             component = self._value(name, where, component, key, entry, meanings[key])
+        values = component._asdict()
         for key, meaning in meanings.items():
-            value = getattr(component, key)
+            value = values[key]
             if key not in table and not meaning.low <= value <= meaning.high:
                 self.mistakes.note(
                     where,

@@ -11,7 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from rigtwin.components import Effect, candidates
+from rigtwin.components.plant import select
 from rigtwin.components.quantity import Quantity
+from rigtwin.components.sensors import MEASURES
 from rigtwin.description.changes import override
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.control import Control
@@ -53,6 +55,8 @@ class Component:
     ----------
     name
         Name in the description.
+    component_type
+        Type of its parameters, such as `Guide`.
     element
         Kind of MJCF element that the component stands for, such as `joint`.
     mjcf
@@ -73,6 +77,7 @@ class Component:
     """
 
     name: str
+    component_type: type
     element: str
     mjcf: str
     joint: str
@@ -81,6 +86,11 @@ class Component:
     kinds: frozenset[str] | None = None
     acts_on: tuple[tuple[str, float], ...] = ()
     turns: bool = False
+
+    @property
+    def quantity(self) -> str:
+        """Quantity that a sensor measures, as a row's kind; empty for all other components."""
+        return MEASURES.get(self.component_type, "")
 
 
 @dataclass(frozen=True)
@@ -299,12 +309,17 @@ class Machine:
         for parameter, setting in self.parameter_settings.items():
             group, _, name = parameter.partition(".")
             # A base with a changed component has priority over the operator's note of its value.
-            if setting in recorded and getattr(start.plant, group) == getattr(self.plant, group):
+            unchanged = select(start.plant, [group]) == select(self.plant, [group])
+            if setting in recorded and unchanged:
                 changes.setdefault(group, {})[name] = recorded[setting]
         try:
             return override(start, changes)
         except RigtwinError as error:
             raise RigtwinError(f"{recording.path}: {error}") from None
+
+    def components_of(self, *types: type) -> list[Component]:
+        """Return the components of any of these types, in the order of the description."""
+        return [known for known in self.components.values() if known.component_type in types]
 
     @property
     def rows(self) -> tuple[Row, ...]:

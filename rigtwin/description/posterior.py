@@ -97,7 +97,7 @@ class Posterior:
 def value_of(configuration: Configuration, key: str) -> float:
     """Return the value of a setting. key: `group.name`."""
     group, _, name = key.partition(".")
-    return float(getattr(groups(configuration)[group], name))
+    return float(groups(configuration)[group]._asdict()[name])
 
 
 def shift_within(configuration: Configuration, key: str, amount: float) -> Configuration:
@@ -222,11 +222,8 @@ def _probability(value: object) -> float:
 def _interval(configuration: Configuration, key: str, ends: object) -> tuple[float, float]:
     """Return the interval of a parameter, which must contain the parameter's value."""
     group, _, name = key.partition(".")
-    known = (
-        fields(type(getattr(configuration.plant, group)))
-        if group in configuration.plant._fields
-        else {}
-    )
+    components = configuration.plant._asdict()
+    known = fields(type(components[group])) if group in components else {}
     if not isinstance(known.get(name), Quantity):
         raise RigtwinError(
             f"{POSTERIOR}.intervals: unknown parameter {key!r}; "

@@ -56,6 +56,22 @@ class Inertia(NamedTuple):
     turns: bool  # Whether the joint turns round, so that the grid's end is its beginning.
 
 
+class Resistance(NamedTuple):
+    """What resists the motion of one joint."""
+
+    guide: Guide  # Friction, springs and backlash of the joint.
+    dry_friction: Friction  # Dry friction of the guide.
+    spring: float  # Stiffness in series with the dry friction, N/m.
+
+
+class Drive(NamedTuple):
+    """Force actuator or servo that pushes one joint."""
+
+    law: Push  # Law from the conditioned command to the force.
+    conditioning: Actuator  # Conditioning of the command, for one integration step.
+    held: ActuatorState  # State of the conditioning, changed in place.
+
+
 class Loop(NamedTuple):
     """Source of the actuator's command: the recording, or a controller in closed loop."""
 
@@ -65,7 +81,22 @@ class Loop(NamedTuple):
     memory: Array  # State of the formula (integrals, filters, delays).
     recorded: Array  # Recorded inputs of the controller, shape (ticks, inputs).
     noise: Array  # Noise added to simulated inputs, shape (ticks, inputs).
-    sensor: np.ndarray  # Simulated sensor of each input, or −1 for a recorded one.
+    sensor_of_input: np.ndarray  # Simulated sensor of each input, or −1 for a recorded one.
+    sensors: tuple[Transducer, ...]  # Sensors that the controller reads.
+    states: tuple[TransducerState, ...]  # States of these sensors, changed in place.
+    neutral: np.ndarray  # Whether each sensor reads the true quantity.
+    rates: np.ndarray  # Quantity of each sensor: 0 position, 1 velocity.
+
+
+class JointState(NamedTuple):
+    """State of one joint between two integration steps."""
+
+    position: float  # Position x, m.
+    velocity: float  # Velocity v half a step earlier, m/s.
+    slider: float  # Position of the friction element, m.
+    viscous: float  # Viscous force behind its relaxation, N.
+    inner: float  # Position of the guide behind its compliant mount, m.
+    speed: float  # Velocity of the guide behind its compliant mount, m/s.
 
 
 @compilable
@@ -97,153 +128,144 @@ def gravity(inertia: Inertia, position: float) -> float:
     return (1.0 - part) * inertia.load[whole] + part * inertia.load[whole + 1]
 
 
-@kernel
-def resist(
-    guide: Guide,
-    dry_friction: Friction,
-    spring: float,
-    rest: float,
-    period: float,
-    motion: Array,
-    out: Array,
-) -> None:
-    """Add a guide's forces to the load that it transmits, for a prescribed motion.
+@compilable
+def drive_step(
+    drive: Drive, command: float, last: float, position: float, velocity: float
+) -> tuple[float, float, float]:
+    """Return the actuator's force over one step.
+
+    The step of the velocity is centred on this position: half of it passes under the command of the
+    step before, and half under that of this step. The force is therefore the mean of both.
 
     Parameters
     ----------
-    guide, dry_friction
-        Guide that resists the motion, and its dry friction.
-    spring
-        Stiffness in series with the dry friction, N/m.
-    rest
-        Position at which the guide's own spring is slack, m.
-    period
-        Time from tick to tick, s.
-    motion
-        Position, velocity and acceleration, m, m/s and m/s², shape (3, ticks).
-    out
-        Transmitted load, N, shape (ticks,); overwritten with the whole force.
+    drive
+        Force actuator or servo.
+    command
+        Command of this tick, in its unit.
+    last
+        `last` as returned for the step before.
+    position, velocity
+        Position and velocity of the joint, m and m/s.
+
+    Returns
+    -------
+    tuple
+        Force without a servo's damping, N, the damping, Ns/m, and what the next step needs: the
+        conditioned command of a servo, m, or the force of a force actuator, N.
     """
-    # At the start the friction spring is slack, as after a long rest.
-    slider, viscous = motion[0, 0], 0.0
-    share = period / (guide.relaxation + period)
-    if guide.mount_compliance > 0.0:
-        inner = motion[0, 0]
-        speed = 0.0
-        for tick in range(motion.shape[1]):
-            place, slider, viscous, force = give_way(
-                guide=guide,
-                dry_friction=dry_friction,
-                spring=spring,
-                rest=rest,
-                share=share,
-                period=period,
-                inner=inner,
-                speed=speed,
-                slider=slider,
-                viscous=viscous,
-                load=out[tick],
-                outer=motion[0, tick],
-            )
-            speed, inner = (place - inner) / period, place
-            out[tick] += force
-        return
-    for tick in range(motion.shape[1]):
-        x, v = motion[0, tick], motion[1, tick]
-        # Load-dependent friction sees inertia, gravity and spring, but not friction itself.
-        transmitted = out[tick] + position_force(guide, x, rest)
-        forward, backward = dry_limits(dry_friction, v, transmitted)
-        dry, by = slide(x - slider, 0.5 * guide.backlash, spring, forward, backward)
-        slider += by
-        viscous += share * (damping(guide, v) * v - viscous)
-        out[tick] = transmitted + dry + viscous + guide.drag * v * abs(v)
+    law = drive.law
+    if law.position_gain <= 0.0:
+        force = push(law, condition(drive.conditioning, drive.held, command), position, velocity)
+        return 0.5 * (last + force), 0.0, force
+    wanted = condition(drive.conditioning, drive.held, command)
+    pushed, held_by = pull(law, 0.5 * (last + wanted), position), law.damping_gain
+    if abs(pushed - held_by * velocity) > law.limit:
+        # A saturated servo has a constant force, so it damps nothing.
+        pushed, held_by = math.copysign(law.limit, pushed - held_by * velocity), 0.0
+    return pushed, held_by, wanted
 
 
-@kernel
-def resist_at_once(
-    guide: Guide, dry_friction: Friction, rest: float, period: float, motion: Array, out: Array
-) -> None:
-    """Add a guide's forces to its load where dry friction has neither backlash nor spring.
-
-    The velocity is known, so dry friction follows its sign and reverses in the same tick.
-
-    Parameters
-    ----------
-    guide, dry_friction
-        Guide that resists the motion, and its dry friction.
-    rest
-        Position at which the guide's own spring is slack, m.
-    period
-        Time from tick to tick, s.
-    motion
-        Position, velocity and acceleration, m, m/s and m/s², shape (3, ticks).
-    out
-        Transmitted load, N, shape (ticks,); overwritten with the whole force.
-    """
-    viscous, share = 0.0, period / (guide.relaxation + period)
-    for tick in range(motion.shape[1]):
-        x, v = motion[0, tick], motion[1, tick]
-        transmitted = out[tick] + position_force(guide, x, rest)
-        forward, backward = dry_limits(dry_friction, v, transmitted)
-        dry = forward if v > 0.0 else (-backward if v < 0.0 else 0.0)
-        viscous += share * (damping(guide, v) * v - viscous)
-        out[tick] = transmitted + dry + viscous + guide.drag * v * abs(v)
-
-
-@kernel
-def inverse_dynamics(
-    guide: Guide,
-    dry_friction: Friction,
+@compilable
+def step_on_mount(
+    resistance: Resistance,
     inertia: Inertia,
-    spring: float,
-    period: float,
-    motion: Array,
-    out: Array,
-) -> None:
-    """Compute the force that moves the joint as prescribed: m·x'' + g(x) + guide's forces.
+    state: JointState,
+    pushed: float,
+    held_by: float,
+    disturbance: float,
+    h: float,
+) -> JointState:
+    """Return the state after one step of a joint whose guide has a compliant mount.
+
+    Parameters are those of `step_joint`.
+    """
+    guide, x = resistance.guide, state.position
+    # The mount decouples the guide: its force follows from the position alone, and is explicit.
+    inner, slider, viscous, held_back = give_way(
+        guide=guide,
+        dry_friction=resistance.dry_friction,
+        spring=resistance.spring,
+        rest=inertia.rest,
+        share=h / (guide.relaxation + h),
+        period=h,
+        inner=state.inner,
+        speed=state.speed,
+        slider=state.slider,
+        viscous=state.viscous,
+        load=pushed,
+        outer=x,
+    )
+    load = pushed + disturbance - gravity(inertia, x) - held_back
+    v = (state.velocity + h * load / inertia.mass) / (1.0 + h * held_by / inertia.mass)
+    return JointState(x + h * v, v, slider, viscous, inner, (inner - state.inner) / h)
+
+
+@compilable
+def step_joint(
+    resistance: Resistance,
+    inertia: Inertia,
+    state: JointState,
+    pushed: float,
+    held_by: float,
+    disturbance: float,
+    h: float,
+) -> JointState:
+    """Return the state after one step of a joint whose guide has a rigid mount.
 
     Parameters
     ----------
-    guide, dry_friction, inertia
-        Guide with its dry friction, and inertia of the joint.
-    spring
-        Stiffness in series with the dry friction, N/m.
-    period
-        Time from tick to tick, s.
-    motion
-        Position, velocity and acceleration, m, m/s and m/s², shape (3, ticks).
-    out
-        Force, written, N, shape (ticks,).
+    resistance, inertia
+        What resists the motion, and inertia of the joint.
+    state
+        State before the step.
+    pushed, held_by
+        Actuator's force without damping, N, and its damping, Ns/m.
+    disturbance
+        Unmodelled force, N.
+    h
+        Integration step, s.
     """
-    for tick in range(motion.shape[1]):
-        x, a = motion[0, tick], motion[2, tick]
-        out[tick] = inertia.mass * a + gravity(inertia, x)
-    resist(
-        guide=guide,
-        dry_friction=dry_friction,
-        spring=spring,
-        rest=inertia.rest,
-        period=period,
-        motion=motion,
-        out=out,
+    guide, spring = resistance.guide, resistance.spring
+    x, v, slider = state.position, state.velocity, state.slider
+    share, half = h / (guide.relaxation + h), 0.5 * guide.backlash
+    coefficient = damping(guide, v)
+    load = (
+        pushed
+        + disturbance
+        - gravity(inertia, x)
+        - position_force(guide, x, inertia.rest)
+        - (1.0 - share) * state.viscous
     )
+    damped = h * (share * coefficient + guide.drag * abs(v) + held_by)
+    # Implicit share of the damping: the midpoint rule's ½ until d·h = 2m, where it would start to
+    # oscillate, and more beyond.
+    ahead = 1.0 - inertia.mass / damped if damped > 2.0 * inertia.mass else 0.5
+    total = inertia.mass + ahead * damped
+    rhs = (inertia.mass - (1.0 - ahead) * damped) * v + h * load
+    forward, backward = dry_limits(resistance.dry_friction, v, pushed)
+    # Without dry friction; then with a stretched spring; then with a slider that slides.
+    velocity = rhs / total
+    stretch_length = x + h * velocity - slider
+    if stretch_length > half or stretch_length < -half:
+        edge = math.copysign(half, stretch_length)
+        velocity = (rhs - h * spring * (x - slider - edge)) / (total + h * h * spring)
+        dry, by = slide(x + h * velocity - slider, half, spring, forward, backward)
+        if by != 0.0:
+            velocity = (rhs - h * dry) / total
+            slider = x + h * velocity - edge - dry / spring
+    between = ahead * velocity + (1.0 - ahead) * v
+    viscous = state.viscous + share * (coefficient * between - state.viscous)
+    return JointState(x + h * velocity, velocity, slider, viscous, state.inner, state.speed)
 
 
 @kernel
 def integrate_pushed(
-    guide: Guide,
-    dry_friction: Friction,
+    resistance: Resistance,
     inertia: Inertia,
-    spring: float,
     start: tuple[float, float],
-    law: Push,
-    drive: Actuator,
-    held: ActuatorState,
-    sensors: tuple[Transducer, ...],
-    states: tuple[TransducerState, ...],
-    kinds: np.ndarray,
+    drive: Drive,
     loop: Loop,
-    command: Array,
     disturbance: Array,
     period: float,
     steps: int,
@@ -253,24 +275,14 @@ def integrate_pushed(
 
     Parameters
     ----------
-    guide, dry_friction, inertia
-        Guide with its dry friction, and inertia of the joint.
-    spring
-        Stiffness in series with the dry friction, N/m.
+    resistance, inertia
+        What resists the motion, and inertia of the joint.
     start
         Initial position and velocity, m and m/s.
-    law
-        Law of the force actuator or servo.
-    drive, held
-        Conditioning of its command, and the state of that.
-    sensors, states
-        Sensors that the controller reads, and their states.
-    kinds
-        Measured quantity of each sensor: 0 position, 1 velocity.
+    drive
+        Force actuator or servo.
     loop
         Source of the command.
-    command
-        Recorded command, shape (ticks,); overwritten by the controller in closed loop.
     disturbance
         Unmodelled force on the joint, N, shape (ticks,).
     period
@@ -278,101 +290,50 @@ def integrate_pushed(
     steps
         Integration steps per tick.
     out
-        Position, velocity and actuator force, written, shape (3, ticks).
+        Position, velocity, actuator force and command, shape (4, ticks). The command is read where
+        the loop is open, and all else is written.
     """
-    # One kernel on purpose: parts of their own would pass and return a dozen scalars of state in
-    # every step.
     h = period / steps
     x, v = start
-    slider, viscous, force = x, damping(guide, v) * v, 0.0
-    # A servo's conditioned command is a position, a force actuator's a force.
-    follows, wanted, held_by = law.position_gain > 0.0, held.memory[3], 0.0
-    half = 0.5 * guide.backlash
-    neutral = np.array([sensor.neutral for sensor in sensors])
-    share = h / (guide.relaxation + h)
-    yields = guide.mount_compliance * inertia.mass > SHORTEST * h * h
-    inner, speed = x, 0.0
-    # Reading a tuple's fields inside the loop costs more than a step.
-    sensor, recorded, noise = loop.sensor, loop.recorded, loop.noise
-    operations, registers, memory = loop.program.operations, loop.registers, loop.memory
-    for tick in range(len(command)):
+    state = JointState(x, v, x, damping(resistance.guide, v) * v, x, 0.0)
+    follows = drive.law.position_gain > 0.0
+    last = drive.held.memory[3] if follows else 0.0
+    yields = resistance.guide.mount_compliance * inertia.mass > SHORTEST * h * h
+    for tick in range(len(disturbance)):
         # Sensors read before the tick's command acts.
+        x, v = state.position, state.velocity
         out[0, tick], out[1, tick] = x, v
-        out[2, tick] = push(law, wanted, x, v) if follows else force
+        out[2, tick] = push(drive.law, last, x, v) if follows else last
         if loop.closed:
-            for number in range(len(sensor)):
-                source = sensor[number]
-                registers[number] = recorded[tick, number]
-                if source >= 0:
-                    true = x if kinds[source] == 0 else v
-                    # A neutral sensor is skipped: reading it from the tuple costs more than the
-                    # rest of a tick.
-                    sensed = (
-                        true
-                        if neutral[source]
-                        else transduce(sensors[source], states[source], true)
-                    )
-                    registers[number] = sensed + noise[tick, number]
-            command[tick] = run(operations, registers, memory, period)
+            out[3, tick] = _compute_command(loop, tick, x, v, period)
         for _ in range(steps):
-            if follows:
-                before, wanted = wanted, condition(drive, held, command[tick])
-                pushed, held_by = pull(law, 0.5 * (before + wanted), x), law.damping_gain
-                if abs(pushed - held_by * v) > law.limit:
-                    # A saturated servo has a constant force, so it damps nothing.
-                    pushed, held_by = math.copysign(law.limit, pushed - held_by * v), 0.0
-            else:
-                earlier = force
-                force = push(law, condition(drive, held, command[tick]), x, v)
-                pushed = 0.5 * (earlier + force)
-            if yields:
-                place, slider, viscous, held_back = give_way(
-                    guide=guide,
-                    dry_friction=dry_friction,
-                    spring=spring,
-                    rest=inertia.rest,
-                    share=share,
-                    period=h,
-                    inner=inner,
-                    speed=speed,
-                    slider=slider,
-                    viscous=viscous,
-                    load=pushed,
-                    outer=x,
-                )
-                speed, inner = (place - inner) / h, place
-                load = pushed + disturbance[tick] - gravity(inertia, x) - held_back
-                v = (v + h * load / inertia.mass) / (1.0 + h * held_by / inertia.mass)
-                x += h * v
-                continue
-            coefficient = damping(guide, v)
-            # The velocity step is centred on this position: half of it passes under the old
-            # command and half under the new one, which is why `pushed` is their mean.
-            load = (
-                pushed
-                + disturbance[tick]
-                - gravity(inertia, x)
-                - position_force(guide, x, inertia.rest)
-                - (1.0 - share) * viscous
+            pushed, held_by, last = drive_step(
+                drive, out[3, tick], last, state.position, state.velocity
             )
-            damped = h * (share * coefficient + guide.drag * abs(v) + held_by)
-            # Implicit share of the damping: the midpoint rule's ½ until d·h = 2m, where it would
-            # start to oscillate, and more beyond.
-            ahead = 1.0 - inertia.mass / damped if damped > 2.0 * inertia.mass else 0.5
-            total = inertia.mass + ahead * damped
-            rhs = (inertia.mass - (1.0 - ahead) * damped) * v + h * load
-            forward, backward = dry_limits(dry_friction, v, pushed)
-            # Without dry friction; then with a stretched spring; then with a slider that slides.
-            velocity = rhs / total
-            stretch_length = x + h * velocity - slider
-            if stretch_length > half or stretch_length < -half:
-                edge = math.copysign(half, stretch_length)
-                velocity = (rhs - h * spring * (x - slider - edge)) / (total + h * h * spring)
-                dry, by = slide(x + h * velocity - slider, half, spring, forward, backward)
-                if by != 0.0:
-                    velocity = (rhs - h * dry) / total
-                    slider = x + h * velocity - edge - dry / spring
-            between = ahead * velocity + (1.0 - ahead) * v
-            viscous += share * (coefficient * between - viscous)
-            v = velocity
-            x += h * v
+            if yields:
+                state = step_on_mount(
+                    resistance, inertia, state, pushed, held_by, disturbance[tick], h
+                )
+            else:
+                state = step_joint(
+                    resistance, inertia, state, pushed, held_by, disturbance[tick], h
+                )
+
+
+@compilable
+def _compute_command(
+    loop: Loop, tick: int, position: float, velocity: float, period: float
+) -> float:
+    """Return the controller's command at a tick, and advance the states of its sensors."""
+    for number in range(len(loop.sensor_of_input)):
+        source = loop.sensor_of_input[number]
+        value = loop.recorded[tick, number]
+        if source >= 0:
+            value = position if loop.rates[source] == 0 else velocity
+            # Neutral sensors are skipped: finding one in the tuple at run time costs more than the
+            # rest of a tick.
+            if not loop.neutral[source]:
+                value = transduce(loop.sensors[source], loop.states[source], value)
+            value += loop.noise[tick, number]
+        loop.registers[number] = value
+    return run(loop.program.operations, loop.registers, loop.memory, period)

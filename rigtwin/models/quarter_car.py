@@ -16,6 +16,7 @@ from controllers import Measurements
 from controllers.force import MOTOR_CONSTANT
 from rigtwin.components import Computer, Cylinder, RigPlant
 from rigtwin.components.effect import Motion
+from rigtwin.components.plant import select
 from rigtwin.components.sensors import apply_sensor
 from rigtwin.description.configuration import Configuration
 from rigtwin.models.basis import Passage, forms
@@ -289,7 +290,7 @@ class QuarterCarModel(Model[RigPlant]):
 
     def predict(self, plant: RigPlant) -> Array:
         """Return the sensors' readings without noise and quantisation, shape (4, ticks)."""
-        mechanical = tuple(getattr(plant, name) for name in MECHANICAL)
+        mechanical = select(plant, MECHANICAL)
         true = self._last.get(mechanical)
         if true is None:
             true = self.predict_true(plant)

@@ -10,7 +10,7 @@ import numpy as np
 
 from controllers import Commands, Measurements
 from rigtwin.components.gas_spring import spring_force
-from rigtwin.components.sensors import apply_sensor, remove_drift, undo_sensor
+from rigtwin.components.sensors import apply_sensor, remove_drift, sensor_of, undo_sensor
 from rigtwin.components.yielding import yield_to_load
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.control import RigControl
@@ -73,12 +73,12 @@ class ComponentReplays:
 
     def _without_zero(self, name: str) -> Array:
         """Return a sensor's reading without mains hum, offset and drift."""
-        sensor = getattr(self.configuration.plant, name)
+        sensor = sensor_of(self.configuration.plant, name)
         return remove_drift(sensor, self._clean(self._sensor(name)), self.period) - sensor.offset
 
     def _apply_sensor(self, name: str, true: Array) -> Array:
         """Return the reading of the twin's sensor of that name for a true signal."""
-        return apply_sensor(getattr(self.configuration.plant, name), true, self.period)
+        return apply_sensor(sensor_of(self.configuration.plant, name), true, self.period)
 
     def _apply_lvdts(self, wheel: Array) -> Array:
         """Return the difference of both LVDTs' readings for a true wheel position, m."""
@@ -90,7 +90,7 @@ class ComponentReplays:
     def _motion(self, name: str, expected: Array) -> EstimatedMotion:
         """Return the true motion behind a sensor's reading, from a replay's prediction of it."""
         # The sensor is inverted for the correction alone, so the prediction keeps its sharp parts.
-        sensor = getattr(self.configuration.plant, name)
+        sensor = sensor_of(self.configuration.plant, name)
         mains = self.configuration.plant.mains.frequency
         estimate = estimate_motion(
             self._sensor(name), self._apply_sensor(name, expected), self.period, mains

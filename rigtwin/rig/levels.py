@@ -12,6 +12,7 @@ import numpy as np
 from controllers import Measurements
 from rigtwin.components import RigPlant, with_parameters
 from rigtwin.components.plant import Plant
+from rigtwin.components.sensors import sensor_of
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import OWN
 from rigtwin.diagnosis.evidence import Evidence
@@ -183,10 +184,8 @@ def _closed_loop(
 def _with_noise_of(noisy: RigPlant, plant: RigPlant) -> RigPlant:
     """Return a plant with the white noise and hum of another plant's sensors."""
     for name in Measurements._fields:
-        like = getattr(noisy, name)
-        plant = plant._replace(
-            **{name: getattr(plant, name)._replace(white=like.white, hum=like.hum)}
-        )
+        like = sensor_of(noisy, name)
+        plant = with_parameters(plant, name, {"white": like.white, "hum": like.hum})
     return plant
 
 

@@ -231,8 +231,9 @@ def continue_motion(before: Simulation, after: Simulation) -> None:
     """
     # The solver's warm start belongs to the state: without it the next step differs in its last
     # digits.
-    for name in ("qpos", "qvel", "act", "ctrl", "qacc_warmstart"):
-        getattr(after.data, name)[:] = getattr(before.data, name)
+    old, new = before.data, after.data
+    new.qpos[:], new.qvel[:], new.act[:], new.ctrl[:] = old.qpos, old.qvel, old.act, old.ctrl
+    new.qacc_warmstart[:] = old.qacc_warmstart
     old_state, new_state = before.state, after.state
     for old, new in (
         (old_state.ground_state, new_state.ground_state),

@@ -88,10 +88,8 @@ def simulate(configuration: Configuration, demands: Array, seed: int) -> Simulat
         run_compiled(Twin(configuration, float(demands[0, 0]), seed), configuration, demands)
     )
     truth = np.concatenate([block.truth for block in blocks if block.truth is not None])
-    commands, measured = (
-        np.concatenate([getattr(block, name) for block in blocks])
-        for name in ("commands", "measurements")
-    )
+    commands = np.concatenate([block.commands for block in blocks])
+    measured = np.concatenate([block.measurements for block in blocks])
     return SimulationResult(commands, measured, truth, blocks[-1].trip)
 
 

@@ -286,12 +286,8 @@ def find_arming_obstacle(limits: Safety, measured: Measurements) -> str | None:
         Reason, or None if the rig may be armed.
     """
     share = 1.0 - limits.hysteresis
-    for name, limit in zip(
-        Measurements._fields,
-        (limits.ground, limits.structure, limits.travel, limits.force),
-        strict=True,
-    ):
-        value = getattr(measured, name)
+    largest = (limits.ground, limits.structure, limits.travel, limits.force)
+    for name, value, limit in zip(Measurements._fields, measured, largest, strict=True):
         if not abs(value) <= share * limit:
             return (
                 f"{name} is {value:.4g}; arming needs it within {share * limit:.4g}, "

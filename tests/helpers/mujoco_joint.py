@@ -12,21 +12,21 @@ from collections.abc import Callable
 import mujoco
 import numpy as np
 
-from rigtwin.components import Guide, Pusher, measures
+from rigtwin.components import Guide
 from rigtwin.components.conditioning import actuator, condition, hold
 from rigtwin.components.guide import damping, dry_limits, friction, position_force, slide
 from rigtwin.components.mount import give_way
 from rigtwin.components.plant import Plant
-from rigtwin.components.servo import pull, push, push_law
+from rigtwin.components.servo import pull, push, push_law, pusher_of
+from rigtwin.description.control import FormulaControl
 from rigtwin.models.commanding import (
     Command,
     Readings,
     command_by_formula,
     commands_of,
 )
-from rigtwin.models.joint import JointModel
 from rigtwin.models.joint_motion import Inertia
-from rigtwin.models.start import Start
+from rigtwin.models.joint_simulation import JointSimulation
 from rigtwin.numerics.arrays import Array
 
 FIXED = 1e12
@@ -40,7 +40,7 @@ OFF = (
 )
 
 
-class MujocoModel(JointModel):
+class MujocoModel(JointSimulation):
     """One joint of a machine in MuJoCo."""
 
     def _mechanics(
@@ -70,7 +70,7 @@ class MujocoModel(JointModel):
     def _inverse_dynamics(self, plant: Plant, position: Array, error: float) -> Array:
         """The force that moves the joint as prescribed, by inverse dynamics."""
         model, data, place, at = self._mechanics(plant, self._period)
-        guide, inertia = self._parts(plant)
+        guide, inertia = self.mechanics(plant)
         dry = friction(guide)
         velocity = np.gradient(position, self._period)
         acceleration = np.gradient(velocity, self._period)
@@ -114,20 +114,16 @@ class MujocoModel(JointModel):
             out[2, tick] = load + rubbed + viscous + guide.drag * v * abs(v)
         return out
 
-    def _integrate_pushed(
-        self,
-        plant: Plant,
-        mover: Pusher,
-        disturbance: Array,
-        noise: Array | None = None,
-        start: Start | None = None,
+    def integrate_pushed(
+        self, plant: Plant, disturbance: Array, noise: Array | None = None
     ) -> Array:
         """The joint under its force actuator or servo."""
         h = self._period / self._steps
         model, data, place, at = self._mechanics(plant, h)
-        guide, inertia = self._parts(plant)
-        data.qpos[place], data.qvel[at] = self._start_of(plant) if start is None else start
+        guide, inertia = self.mechanics(plant)
+        data.qpos[place], data.qvel[at] = self._start_of(plant)
         passive = _Passive(guide, h, inertia, float(data.qpos[place]))
+        mover = pusher_of(plant, self.mover.name)
         drive = actuator(mover, plant.computer, h)
         held = hold(drive, float(self._command[0]))
         law, wanted = push_law(mover), float(held.memory[3])
@@ -157,18 +153,20 @@ class MujocoModel(JointModel):
     def _reader(self, plant: Plant) -> Callable[[int, float, float], float]:
         """The command of a tick for the joint's position and velocity, as the controller sees
         them."""
-        names = self._sensors or self.sensors_of_joint()
+        names = list(self.control.sensors) or self.sensors_of_joint()
         ticks, columns = self._signals.ticks, self._signals.columns
         readings = Readings(plant, names, {}, self._period, ticks)
-        rates = {name: measures(getattr(plant, name)) == "velocity" for name in names}
-        channel = self._machine.components[self._replay.moved_by[0]].channel
+        components = self._machine.components
+        rates = {name: components[name].quantity == "velocity" for name in names}
+        channel = self.mover.channel
         output = [self._replay.moved_by[0] if channel is None else channel[1]]
         recorded = self._command
         own: Command = lambda tick, _: float(recorded[tick])  # noqa: E731
-        if self._control is not None:
-            components = self._machine.components
+        control = self._machine.control
+        if self.control.runs and isinstance(control, FormulaControl):
+            settings = self._configuration.controller._asdict()
             sensors = {c: name for name in names if (c := components[name].channel) is not None}
-            own = command_by_formula(self._control, self._settings, columns, sensors, self._period)
+            own = command_by_formula(control, settings, columns, sensors, self._period)
 
         def command(tick: int, position: float, velocity: float) -> float:
             true = {name: velocity if rate else position for name, rate in rates.items()}
@@ -183,8 +181,7 @@ class MujocoModel(JointModel):
         return [
             name
             for name, component in self._machine.components.items()
-            if component.joint == joint
-            and measures(getattr(self._machine.plant, name)) in ("position", "velocity")
+            if component.joint == joint and component.quantity in ("position", "velocity")
         ]
 
 

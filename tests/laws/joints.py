@@ -11,7 +11,8 @@ from rigtwin.components.conditioning import actuator, hold
 from rigtwin.components.guide import friction
 from rigtwin.components.sensors import start_transducer, transducer
 from rigtwin.components.servo import push_law
-from rigtwin.models.joint_motion import Inertia, Loop, integrate_pushed, inverse_dynamics
+from rigtwin.models.joint_inverse import inverse_dynamics
+from rigtwin.models.joint_motion import Drive, Inertia, Loop, Resistance, integrate_pushed
 from rigtwin.numerics.arrays import Array
 
 PERIOD = 1e-3
@@ -61,6 +62,7 @@ def motion_under(
     of = ForceActuator() if mover is None else mover
     none = formula("0", {})
     empty = np.zeros((1, 1))
+    sensor = transducer(PositionSensor(), PERIOD)
     loop = Loop(
         closed=False,
         program=none.program,
@@ -68,28 +70,24 @@ def motion_under(
         memory=none.memory(),
         recorded=empty,
         noise=empty,
-        sensor=np.zeros(0, np.int64),
-    )
-    drive = actuator(of, Computer(), PERIOD / steps)
-    sensor = transducer(PositionSensor(), PERIOD)
-    motion = np.zeros((3, len(command)))
-    integrate_pushed(
-        guide=guide,
-        dry_friction=friction(guide),
-        inertia=inertia_of(mass, load),
-        spring=spring,
-        start=start,
-        law=push_law(of),
-        drive=drive,
-        held=hold(drive, float(command[0])),
+        sensor_of_input=np.zeros(0, np.int64),
         sensors=(sensor,),
         states=(start_transducer(sensor),),
-        kinds=np.zeros(1, np.int64),
+        neutral=np.ones(1, np.bool_),
+        rates=np.zeros(1, np.int64),
+    )
+    conditioning = actuator(of, Computer(), PERIOD / steps)
+    motion = np.zeros((4, len(command)))
+    motion[3] = command
+    integrate_pushed(
+        resistance=Resistance(guide, friction(guide), spring),
+        inertia=inertia_of(mass, load),
+        start=start,
+        drive=Drive(push_law(of), conditioning, hold(conditioning, float(command[0]))),
         loop=loop,
-        command=command.astype(float),
         disturbance=np.zeros(len(command)),
         period=PERIOD,
         steps=steps,
         out=motion,
     )
-    return motion
+    return motion[:3]

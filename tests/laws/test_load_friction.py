@@ -14,7 +14,7 @@ import pytest
 from rigtwin.components import Guide
 from rigtwin.components.guide import friction
 from rigtwin.description.document import load
-from rigtwin.models.joint_motion import resist_at_once
+from rigtwin.models.joint_inverse import resist_at_once
 from rigtwin.recording import Recording
 from tests.laws.joints import INTERPRETED, PERIOD, force_to_move, motion_under
 from tests.laws.written import law_of
