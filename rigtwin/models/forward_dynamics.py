@@ -37,7 +37,8 @@ from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Machine, ReplayOf, Row
 from rigtwin.models.basis import Passage, forms
 from rigtwin.models.following import follow_command
-from rigtwin.models.forward_motion import GuideContacts, Servos, State, StepInputs, advance
+from rigtwin.models.forward_arrays import GuideContacts, Servos, State, StepInputs, allocate
+from rigtwin.models.forward_motion import advance
 from rigtwin.models.initial_state import InitialState, Seen, Sense
 from rigtwin.models.joint import SEED, SMALL
 from rigtwin.models.joint_motion import RIGID
@@ -444,6 +445,7 @@ class ForwardDynamicsModel(Model[Plant]):
             h = self._period / self._steps
             state = begin(contacts, start, inputs.prescribed, self._held, h)
             out = np.zeros((3, size, ticks))
+            work = allocate(size, self._loose, len(self._guides), len(self._servos))
             advance(
                 bodies=bodies,
                 contacts=contacts,
@@ -453,6 +455,7 @@ class ForwardDynamicsModel(Model[Plant]):
                 inputs=inputs._replace(
                     disturbance=disturbance, guide_disturbance=guide_disturbance
                 ),
+                work=work,
                 h=h,
                 steps=self._steps,
                 first=0,

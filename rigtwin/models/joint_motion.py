@@ -23,7 +23,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from controllers.compiled import compilable
+from controllers.compiled import compilable, inlined
 from controllers.formula import Program, run
 from rigtwin.components import Guide
 from rigtwin.components.conditioning import Actuator, ActuatorState, condition
@@ -62,6 +62,8 @@ class Resistance(NamedTuple):
     guide: Guide  # Friction, springs and backlash of the joint.
     dry_friction: Friction  # Dry friction of the guide.
     spring: float  # Stiffness in series with the dry friction, N/m.
+    rest: float  # Position at which the guide's spring is slack, m.
+    share: float  # Share by which viscous friction relaxes in an integration step.
 
 
 class Drive(NamedTuple):
@@ -86,17 +88,6 @@ class Loop(NamedTuple):
     states: tuple[TransducerState, ...]  # States of these sensors, changed in place.
     neutral: np.ndarray  # Whether each sensor reads the true quantity.
     rates: np.ndarray  # Quantity of each sensor: 0 position, 1 velocity.
-
-
-class JointState(NamedTuple):
-    """State of one joint between two integration steps."""
-
-    position: float  # Position x, m.
-    velocity: float  # Velocity v half a step earlier, m/s.
-    slider: float  # Position of the friction element, m.
-    viscous: float  # Viscous force behind its relaxation, N.
-    inner: float  # Position of the guide behind its compliant mount, m.
-    speed: float  # Velocity of the guide behind its compliant mount, m/s.
 
 
 @compilable
@@ -128,9 +119,9 @@ def gravity(inertia: Inertia, position: float) -> float:
     return (1.0 - part) * inertia.load[whole] + part * inertia.load[whole + 1]
 
 
-@compilable
+@inlined
 def drive_step(
-    drive: Drive, command: float, last: float, position: float, velocity: float
+    law: Push, conditioned: float, last: float, position: float, velocity: float
 ) -> tuple[float, float, float]:
     """Return the actuator's force over one step.
 
@@ -139,10 +130,10 @@ def drive_step(
 
     Parameters
     ----------
-    drive
-        Force actuator or servo.
-    command
-        Command of this tick, in its unit.
+    law
+        Law of the force actuator or servo.
+    conditioned
+        Conditioned command of this step, in its unit.
     last
         `last` as returned for the step before.
     position, velocity
@@ -154,95 +145,94 @@ def drive_step(
         Force without a servo's damping, N, the damping, Ns/m, and what the next step needs: the
         conditioned command of a servo, m, or the force of a force actuator, N.
     """
-    law = drive.law
     if law.position_gain <= 0.0:
-        force = push(law, condition(drive.conditioning, drive.held, command), position, velocity)
+        force = push(law, conditioned, position, velocity)
         return 0.5 * (last + force), 0.0, force
-    wanted = condition(drive.conditioning, drive.held, command)
-    pushed, held_by = pull(law, 0.5 * (last + wanted), position), law.damping_gain
+    pushed, held_by = pull(law, 0.5 * (last + conditioned), position), law.damping_gain
     if abs(pushed - held_by * velocity) > law.limit:
         # A saturated servo has a constant force, so it damps nothing.
         pushed, held_by = math.copysign(law.limit, pushed - held_by * velocity), 0.0
-    return pushed, held_by, wanted
+    return pushed, held_by, conditioned
 
 
-@compilable
+@inlined
 def step_on_mount(
     resistance: Resistance,
-    inertia: Inertia,
-    state: JointState,
+    mass: float,
+    state: tuple[float, float, float, float],
+    mount: tuple[float, float],
     pushed: float,
     held_by: float,
-    disturbance: float,
+    outer: float,
     h: float,
-) -> JointState:
-    """Return the state after one step of a joint whose guide has a compliant mount.
+) -> tuple[float, float, float, float, float, float]:
+    """Advance a joint whose guide has a compliant mount by one step.
 
-    Parameters are those of `step_joint`.
+    `mount` is the position of the guide behind its mount, m, and its velocity, m/s. Both follow
+    `state` in what is returned. The other parameters are those of `step_joint`.
     """
-    guide, x = resistance.guide, state.position
+    guide, (x, v, slider, viscous) = resistance.guide, state
     # The mount decouples the guide: its force follows from the position alone, and is explicit.
     inner, slider, viscous, held_back = give_way(
         guide=guide,
         dry_friction=resistance.dry_friction,
         spring=resistance.spring,
-        rest=inertia.rest,
-        share=h / (guide.relaxation + h),
+        rest=resistance.rest,
+        share=resistance.share,
         period=h,
-        inner=state.inner,
-        speed=state.speed,
-        slider=state.slider,
-        viscous=state.viscous,
+        inner=mount[0],
+        speed=mount[1],
+        slider=slider,
+        viscous=viscous,
         load=pushed,
         outer=x,
     )
-    load = pushed + disturbance - gravity(inertia, x) - held_back
-    v = (state.velocity + h * load / inertia.mass) / (1.0 + h * held_by / inertia.mass)
-    return JointState(x + h * v, v, slider, viscous, inner, (inner - state.inner) / h)
+    v = (v + h * (outer - held_back) / mass) / (1.0 + h * held_by / mass)
+    return x + h * v, v, slider, viscous, inner, (inner - mount[0]) / h
 
 
-@compilable
+@inlined
 def step_joint(
     resistance: Resistance,
-    inertia: Inertia,
-    state: JointState,
+    mass: float,
+    state: tuple[float, float, float, float],
     pushed: float,
     held_by: float,
-    disturbance: float,
+    outer: float,
     h: float,
-) -> JointState:
-    """Return the state after one step of a joint whose guide has a rigid mount.
+) -> tuple[float, float, float, float]:
+    """Advance a joint whose guide has a rigid mount by one step.
 
     Parameters
     ----------
-    resistance, inertia
-        What resists the motion, and inertia of the joint.
+    resistance
+        What resists the motion.
+    mass
+        Inertia of the joint, kg.
     state
-        State before the step.
+        Position, m, velocity, m/s, position of the friction element, m, and viscous force, N.
     pushed, held_by
         Actuator's force without damping, N, and its damping, Ns/m.
-    disturbance
-        Unmodelled force, N.
+    outer
+        All forces but the guide's and the damping's: actuator, disturbance and gravity, N.
     h
         Integration step, s.
+
+    Returns
+    -------
+    tuple
+        State after the step.
     """
-    guide, spring = resistance.guide, resistance.spring
-    x, v, slider = state.position, state.velocity, state.slider
-    share, half = h / (guide.relaxation + h), 0.5 * guide.backlash
+    guide, spring, (x, v, slider, viscous) = resistance.guide, resistance.spring, state
+    share, half = resistance.share, 0.5 * guide.backlash
     coefficient = damping(guide, v)
-    load = (
-        pushed
-        + disturbance
-        - gravity(inertia, x)
-        - position_force(guide, x, inertia.rest)
-        - (1.0 - share) * state.viscous
-    )
+    load = outer - position_force(guide, x, resistance.rest) - (1.0 - share) * viscous
     damped = h * (share * coefficient + guide.drag * abs(v) + held_by)
     # Implicit share of the damping: the midpoint rule's ½ until d·h = 2m, where it would start to
     # oscillate, and more beyond.
-    ahead = 1.0 - inertia.mass / damped if damped > 2.0 * inertia.mass else 0.5
-    total = inertia.mass + ahead * damped
-    rhs = (inertia.mass - (1.0 - ahead) * damped) * v + h * load
+    ahead = 1.0 - mass / damped if damped > 2.0 * mass else 0.5
+    total = mass + ahead * damped
+    rhs = (mass - (1.0 - ahead) * damped) * v + h * load
     forward, backward = dry_limits(resistance.dry_friction, v, pushed)
     # Without dry friction; then with a stretched spring; then with a slider that slides.
     velocity = rhs / total
@@ -255,8 +245,8 @@ def step_joint(
             velocity = (rhs - h * dry) / total
             slider = x + h * velocity - edge - dry / spring
     between = ahead * velocity + (1.0 - ahead) * v
-    viscous = state.viscous + share * (coefficient * between - state.viscous)
-    return JointState(x + h * velocity, velocity, slider, viscous, state.inner, state.speed)
+    viscous += share * (coefficient * between - viscous)
+    return x + h * velocity, velocity, slider, viscous
 
 
 @kernel
@@ -295,45 +285,42 @@ def integrate_pushed(
     """
     h = period / steps
     x, v = start
-    state = JointState(x, v, x, damping(resistance.guide, v) * v, x, 0.0)
-    follows = drive.law.position_gain > 0.0
-    last = drive.held.memory[3] if follows else 0.0
-    yields = resistance.guide.mount_compliance * inertia.mass > SHORTEST * h * h
+    slider, viscous, inner, speed = x, damping(resistance.guide, v) * v, x, 0.0
+    # Reading an array from a tuple counts references too, so all of them are read before the loop.
+    law, conditioning, held = drive.law, drive.conditioning, drive.held
+    closed, program, registers, memory = loop.closed, loop.program, loop.registers, loop.memory
+    recorded, noise, sensor_of_input = loop.recorded, loop.noise, loop.sensor_of_input
+    neutral, rates, command, operations = loop.neutral, loop.rates, out[3], program.operations
+    follows = law.position_gain > 0.0
+    last = held.memory[3] if follows else 0.0
+    mass = inertia.mass
+    yields = resistance.guide.mount_compliance * mass > SHORTEST * h * h
     for tick in range(len(disturbance)):
         # Sensors read before the tick's command acts.
-        x, v = state.position, state.velocity
         out[0, tick], out[1, tick] = x, v
-        out[2, tick] = push(drive.law, last, x, v) if follows else last
-        if loop.closed:
-            out[3, tick] = _compute_command(loop, tick, x, v, period)
+        out[2, tick] = push(law, last, x, v) if follows else last
+        if closed:
+            for number in range(len(sensor_of_input)):
+                source = sensor_of_input[number]
+                registers[number] = recorded[tick, number]
+                if source >= 0:
+                    value = x if rates[source] == 0 else v
+                    # Neutral sensors are skipped: finding one in the tuple at run time costs more
+                    # than the rest of a tick.
+                    if not neutral[source]:
+                        value = transduce(loop.sensors[source], loop.states[source], value)
+                    registers[number] = value + noise[tick, number]
+            command[tick] = run(operations, registers, memory, period)
         for _ in range(steps):
-            pushed, held_by, last = drive_step(
-                drive, out[3, tick], last, state.position, state.velocity
-            )
+            conditioned = condition(conditioning, held, command[tick])
+            pushed, held_by, last = drive_step(law, conditioned, last, x, v)
+            outer = pushed + disturbance[tick] - gravity(inertia, x)
+            state = x, v, slider, viscous
             if yields:
-                state = step_on_mount(
-                    resistance, inertia, state, pushed, held_by, disturbance[tick], h
+                x, v, slider, viscous, inner, speed = step_on_mount(
+                    resistance, mass, state, (inner, speed), pushed, held_by, outer, h
                 )
             else:
-                state = step_joint(
-                    resistance, inertia, state, pushed, held_by, disturbance[tick], h
+                x, v, slider, viscous = step_joint(
+                    resistance, mass, state, pushed, held_by, outer, h
                 )
-
-
-@compilable
-def _compute_command(
-    loop: Loop, tick: int, position: float, velocity: float, period: float
-) -> float:
-    """Return the controller's command at a tick, and advance the states of its sensors."""
-    for number in range(len(loop.sensor_of_input)):
-        source = loop.sensor_of_input[number]
-        value = loop.recorded[tick, number]
-        if source >= 0:
-            value = position if loop.rates[source] == 0 else velocity
-            # Neutral sensors are skipped: finding one in the tuple at run time costs more than the
-            # rest of a tick.
-            if not loop.neutral[source]:
-                value = transduce(loop.sensors[source], loop.states[source], value)
-            value += loop.noise[tick, number]
-        loop.registers[number] = value
-    return run(loop.program.operations, loop.registers, loop.memory, period)

@@ -345,7 +345,8 @@ class JointSimulation:
         # Dry friction without a spring of its own gets the stiffest one that the step resolves.
         rigid = RIGID * inertia.mass / h**2
         spring = rigid if guide.compliance <= 0.0 else min(1.0 / guide.compliance, rigid)
-        resistance = Resistance(guide, friction(guide), spring)
+        share = h / (guide.relaxation + h)
+        resistance = Resistance(guide, friction(guide), spring, inertia.rest, share)
         mover = pusher_of(plant, self.mover.name)
         law, conditioning = push_law(mover), actuator(mover, plant.computer, h)
 

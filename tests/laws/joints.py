@@ -80,7 +80,7 @@ def motion_under(
     motion = np.zeros((4, len(command)))
     motion[3] = command
     integrate_pushed(
-        resistance=Resistance(guide, friction(guide), spring),
+        resistance=Resistance(guide, friction(guide), spring, 0.0),
         inertia=inertia_of(mass, load),
         start=start,
         drive=Drive(push_law(of), conditioning, hold(conditioning, float(command[0]))),
