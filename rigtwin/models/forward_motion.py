@@ -39,7 +39,7 @@ from rigtwin.models.joint_motion import SHORTEST
 from rigtwin.models.multibody import Bodies, find_terms
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.cholesky import factor, solve
-from rigtwin.numerics.compiling import kernel, loop
+from rigtwin.numerics.compiling import kernel, loop_kernel
 
 # Numba needs the lengths of tuples at compile time. `Friction.changing` is a flag, not a number.
 GUIDE, NUMBERS = len(Guide._fields), len(Friction._fields) - 1
@@ -287,7 +287,7 @@ def required_force(
     return force - work.pushed[i]
 
 
-@loop
+@loop_kernel
 def advance(
     bodies: Bodies,
     contacts: GuideContacts,

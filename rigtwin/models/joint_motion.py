@@ -32,7 +32,7 @@ from rigtwin.components.mount import give_way
 from rigtwin.components.sensors import Transducer, TransducerState, transduce
 from rigtwin.components.servo import Push, pull, push
 from rigtwin.numerics.arrays import Array
-from rigtwin.numerics.compiling import kernel
+from rigtwin.numerics.compiling import loop_kernel
 
 FURTHEST = 1e12
 """Largest position that is looked up in the gravity grid, in grid spacings."""
@@ -120,8 +120,37 @@ def gravity(inertia: Inertia, position: float) -> float:
 
 
 @inlined
-def drive_step(
-    law: Push, conditioned: float, last: float, position: float, velocity: float
+def compute_command(loop: Loop, tick: int, x: float, v: float, period: float) -> float:
+    """Return the controller's command at a tick, and advance the states of its sensors.
+
+    Parameters
+    ----------
+    loop
+        Controller with its sensors.
+    tick
+        Number of the tick.
+    x, v
+        Position and velocity of the joint, m and m/s.
+    period
+        Time from tick to tick, s.
+    """
+    for number in range(len(loop.sensor_of_input)):
+        source = loop.sensor_of_input[number]
+        value = loop.recorded[tick, number]
+        if source >= 0:
+            value = x if loop.rates[source] == 0 else v
+            # Neutral sensors are skipped: finding one in the tuple at run time costs more than the
+            # rest of a tick.
+            if not loop.neutral[source]:
+                value = transduce(loop.sensors[source], loop.states[source], value)
+            value += loop.noise[tick, number]
+        loop.registers[number] = value
+    return run(loop.program.operations, loop.registers, loop.memory, period)
+
+
+@inlined
+def push_joint(
+    drive: Drive, command: float, last: float, x: float, v: float
 ) -> tuple[float, float, float]:
     """Return the actuator's force over one step.
 
@@ -130,13 +159,13 @@ def drive_step(
 
     Parameters
     ----------
-    law
-        Law of the force actuator or servo.
-    conditioned
-        Conditioned command of this step, in its unit.
+    drive
+        Force actuator or servo.
+    command
+        Command of this tick, in its unit.
     last
         `last` as returned for the step before.
-    position, velocity
+    x, v
         Position and velocity of the joint, m and m/s.
 
     Returns
@@ -145,14 +174,16 @@ def drive_step(
         Force without a servo's damping, N, the damping, Ns/m, and what the next step needs: the
         conditioned command of a servo, m, or the force of a force actuator, N.
     """
+    law = drive.law
+    wanted = condition(drive.conditioning, drive.held, command)
     if law.position_gain <= 0.0:
-        force = push(law, conditioned, position, velocity)
+        force = push(law, wanted, x, v)
         return 0.5 * (last + force), 0.0, force
-    pushed, held_by = pull(law, 0.5 * (last + conditioned), position), law.damping_gain
-    if abs(pushed - held_by * velocity) > law.limit:
+    pushed, held_by = pull(law, 0.5 * (last + wanted), x), law.damping_gain
+    if abs(pushed - held_by * v) > law.limit:
         # A saturated servo has a constant force, so it damps nothing.
-        pushed, held_by = math.copysign(law.limit, pushed - held_by * velocity), 0.0
-    return pushed, held_by, conditioned
+        pushed, held_by = math.copysign(law.limit, pushed - held_by * v), 0.0
+    return pushed, held_by, wanted
 
 
 @inlined
@@ -249,7 +280,7 @@ def step_joint(
     return x + h * velocity, velocity, slider, viscous
 
 
-@kernel
+@loop_kernel
 def integrate_pushed(
     resistance: Resistance,
     inertia: Inertia,
@@ -286,34 +317,18 @@ def integrate_pushed(
     h = period / steps
     x, v = start
     slider, viscous, inner, speed = x, damping(resistance.guide, v) * v, x, 0.0
-    # Reading an array from a tuple counts references too, so all of them are read before the loop.
-    law, conditioning, held = drive.law, drive.conditioning, drive.held
-    closed, program, registers, memory = loop.closed, loop.program, loop.registers, loop.memory
-    recorded, noise, sensor_of_input = loop.recorded, loop.noise, loop.sensor_of_input
-    neutral, rates, command, operations = loop.neutral, loop.rates, out[3], program.operations
+    law, mass = drive.law, inertia.mass
     follows = law.position_gain > 0.0
-    last = held.memory[3] if follows else 0.0
-    mass = inertia.mass
+    last = drive.held.memory[3] if follows else 0.0
     yields = resistance.guide.mount_compliance * mass > SHORTEST * h * h
     for tick in range(len(disturbance)):
         # Sensors read before the tick's command acts.
         out[0, tick], out[1, tick] = x, v
         out[2, tick] = push(law, last, x, v) if follows else last
-        if closed:
-            for number in range(len(sensor_of_input)):
-                source = sensor_of_input[number]
-                registers[number] = recorded[tick, number]
-                if source >= 0:
-                    value = x if rates[source] == 0 else v
-                    # Neutral sensors are skipped: finding one in the tuple at run time costs more
-                    # than the rest of a tick.
-                    if not neutral[source]:
-                        value = transduce(loop.sensors[source], loop.states[source], value)
-                    registers[number] = value + noise[tick, number]
-            command[tick] = run(operations, registers, memory, period)
+        if loop.closed:
+            out[3, tick] = compute_command(loop, tick, x, v, period)
         for _ in range(steps):
-            conditioned = condition(conditioning, held, command[tick])
-            pushed, held_by, last = drive_step(law, conditioned, last, x, v)
+            pushed, held_by, last = push_joint(drive, out[3, tick], last, x, v)
             outer = pushed + disturbance[tick] - gravity(inertia, x)
             state = x, v, slider, viscous
             if yields:

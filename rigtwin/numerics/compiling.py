@@ -86,7 +86,7 @@ def kernel(function: Function) -> Function:
     return _compile(function, {})
 
 
-def loop(function: Function) -> Function:
+def loop_kernel(function: Function) -> Function:
     """Compile a function as `kernel` does, for a loop that allocates nothing.
 
     Its arrays belong to its caller, so their references need no counting. Counting them takes
