@@ -25,7 +25,8 @@ from numba.np.unsafe.ndarray import to_fixed_tuple
 from controllers.compiled import inlined
 from rigtwin.components import Guide
 from rigtwin.components.guide import Friction, damping, dry_limits, position_force, slide
-from rigtwin.components.mount import give_way
+from rigtwin.components.mount import MountState, give_way
+from rigtwin.components.resistance import Resistance
 from rigtwin.components.servo import Push, pull, push
 from rigtwin.models.coupled_friction import rub
 from rigtwin.models.forward_arrays import (
@@ -116,22 +117,12 @@ def hold_back(
 
     The mount decouples the guide: its force follows from the position alone, and is explicit.
     """
-    inner, slider, viscous, force = give_way(
-        guide=guide,
-        dry_friction=friction_of(contacts.dry[g]),
-        spring=contacts.springs[g],
-        rest=contacts.rests[g],
-        share=h / (guide.relaxation + h),
-        period=h,
-        inner=state.inner[g],
-        speed=state.within[g],
-        slider=state.slider[g],
-        viscous=state.viscous[g],
-        load=load,
-        outer=place,
-    )
-    state.within[g] = (inner - state.inner[g]) / h
-    state.inner[g], state.slider[g], state.viscous[g] = inner, slider, viscous
+    share, dry = h / (guide.relaxation + h), friction_of(contacts.dry[g])
+    resistance = Resistance(guide, dry, contacts.springs[g], contacts.rests[g], h, share)
+    before = MountState(state.inner[g], state.within[g], state.slider[g], state.viscous[g])
+    after, force = give_way(resistance, before, load, place)
+    state.inner[g], state.within[g] = after.inner, after.speed
+    state.slider[g], state.viscous[g] = after.slider, after.viscous
     return force
 
 

@@ -22,8 +22,9 @@ from numpy.typing import NDArray
 from rigtwin.components import Base, Body, Guide, Rotor, Schedule
 from rigtwin.components.body import list_surplus
 from rigtwin.components.effect import Motion
-from rigtwin.components.guide import acts, friction
+from rigtwin.components.guide import acts
 from rigtwin.components.plant import Plant, component_of, select
+from rigtwin.components.resistance import resistance_of
 from rigtwin.components.schedule import follow, scheduled_force
 from rigtwin.components.sensors import apply_sensor, sensor_of
 from rigtwin.description.machine import Machine, ReplayOf, Row
@@ -226,19 +227,10 @@ class InverseDynamicsModel(Model[Plant]):
         guide_motion = np.ascontiguousarray(np.einsum("j,kjt->kt", along, motion))
         load = along @ bodies / float(along @ along)
         out = load.copy()
-        if guide.compliance == guide.mount_compliance == guide.backlash == 0.0:
-            resist_at_once(guide, friction(guide), 0.0, self._interval, guide_motion, out)
-            return out - load
+        at_once = guide.compliance == guide.mount_compliance == guide.backlash == 0.0
         softest = softest_contact(guide, load, guide_motion[0], self._position_error(along))
-        resist(
-            guide=guide,
-            dry_friction=friction(guide),
-            spring=1.0 / softest,
-            rest=0.0,
-            period=self._interval,
-            motion=guide_motion,
-            out=out,
-        )
+        resistance = resistance_of(guide, 1.0 / softest, 0.0, self._interval)
+        (resist_at_once if at_once else resist)(resistance, guide_motion, out)
         return out - load
 
     def _position_error(self, along: Array) -> float:

@@ -25,10 +25,10 @@ import numpy as np
 
 from controllers.compiled import compilable, inlined
 from controllers.formula import Program, run
-from rigtwin.components import Guide
 from rigtwin.components.conditioning import Actuator, ActuatorState, condition
-from rigtwin.components.guide import Friction, damping, dry_limits, position_force, slide
-from rigtwin.components.mount import give_way
+from rigtwin.components.guide import damping, dry_limits, position_force, slide
+from rigtwin.components.mount import MountState, give_way
+from rigtwin.components.resistance import Resistance
 from rigtwin.components.sensors import Transducer, TransducerState, transduce
 from rigtwin.components.servo import Push, pull, push
 from rigtwin.numerics.arrays import Array
@@ -52,18 +52,7 @@ class Inertia(NamedTuple):
     first: float  # First position of the grid, m or rad.
     spacing: float  # Spacing of the grid, m or rad.
     load: Array  # Gravity load on the grid, N or Nm, shape (positions,).
-    rest: float  # Position at which the guide's spring is slack, m or rad.
     turns: bool  # Whether the joint turns round, so that the grid's end is its beginning.
-
-
-class Resistance(NamedTuple):
-    """What resists the motion of one joint."""
-
-    guide: Guide  # Friction, springs and backlash of the joint.
-    dry_friction: Friction  # Dry friction of the guide.
-    spring: float  # Stiffness in series with the dry friction, N/m.
-    rest: float  # Position at which the guide's spring is slack, m.
-    share: float  # Share by which viscous friction relaxes in an integration step.
 
 
 class Drive(NamedTuple):
@@ -187,42 +176,6 @@ def push_joint(
 
 
 @inlined
-def step_on_mount(
-    resistance: Resistance,
-    mass: float,
-    state: tuple[float, float, float, float],
-    mount: tuple[float, float],
-    pushed: float,
-    held_by: float,
-    outer: float,
-    h: float,
-) -> tuple[float, float, float, float, float, float]:
-    """Advance a joint whose guide has a compliant mount by one step.
-
-    `mount` is the position of the guide behind its mount, m, and its velocity, m/s. Both follow
-    `state` in what is returned. The other parameters are those of `step_joint`.
-    """
-    guide, (x, v, slider, viscous) = resistance.guide, state
-    # The mount decouples the guide: its force follows from the position alone, and is explicit.
-    inner, slider, viscous, held_back = give_way(
-        guide=guide,
-        dry_friction=resistance.dry_friction,
-        spring=resistance.spring,
-        rest=resistance.rest,
-        share=resistance.share,
-        period=h,
-        inner=mount[0],
-        speed=mount[1],
-        slider=slider,
-        viscous=viscous,
-        load=pushed,
-        outer=x,
-    )
-    v = (v + h * (outer - held_back) / mass) / (1.0 + h * held_by / mass)
-    return x + h * v, v, slider, viscous, inner, (inner - mount[0]) / h
-
-
-@inlined
 def step_joint(
     resistance: Resistance,
     mass: float,
@@ -230,7 +183,6 @@ def step_joint(
     pushed: float,
     held_by: float,
     outer: float,
-    h: float,
 ) -> tuple[float, float, float, float]:
     """Advance a joint whose guide has a rigid mount by one step.
 
@@ -246,8 +198,6 @@ def step_joint(
         Actuator's force without damping, N, and its damping, Ns/m.
     outer
         All forces but the guide's and the damping's: actuator, disturbance and gravity, N.
-    h
-        Integration step, s.
 
     Returns
     -------
@@ -255,7 +205,7 @@ def step_joint(
         State after the step.
     """
     guide, spring, (x, v, slider, viscous) = resistance.guide, resistance.spring, state
-    share, half = resistance.share, 0.5 * guide.backlash
+    h, share, half = resistance.step, resistance.share, 0.5 * guide.backlash
     coefficient = damping(guide, v)
     load = outer - position_force(guide, x, resistance.rest) - (1.0 - share) * viscous
     damped = h * (share * coefficient + guide.drag * abs(v) + held_by)
@@ -314,9 +264,9 @@ def integrate_pushed(
         Position, velocity, actuator force and command, shape (4, ticks). The command is read where
         the loop is open, and all else is written.
     """
-    h = period / steps
-    x, v = start
-    slider, viscous, inner, speed = x, damping(resistance.guide, v) * v, x, 0.0
+    h, (x, v) = resistance.step, start
+    slider, viscous = x, damping(resistance.guide, v) * v
+    behind = MountState(x, 0.0, slider, viscous)
     law, mass = drive.law, inertia.mass
     follows = law.position_gain > 0.0
     last = drive.held.memory[3] if follows else 0.0
@@ -330,12 +280,13 @@ def integrate_pushed(
         for _ in range(steps):
             pushed, held_by, last = push_joint(drive, out[3, tick], last, x, v)
             outer = pushed + disturbance[tick] - gravity(inertia, x)
-            state = x, v, slider, viscous
             if yields:
-                x, v, slider, viscous, inner, speed = step_on_mount(
-                    resistance, mass, state, (inner, speed), pushed, held_by, outer, h
-                )
+                behind, held_back = give_way(resistance, behind, pushed, x)
+                # The mount decouples the guide, whose force is therefore explicit; only a servo's
+                # damping is implicit.
+                v = (v + h * (outer - held_back) / mass) / (1.0 + h * held_by / mass)
+                x += h * v
             else:
                 x, v, slider, viscous = step_joint(
-                    resistance, mass, state, pushed, held_by, outer, h
+                    resistance, mass, (x, v, slider, viscous), pushed, held_by, outer
                 )

@@ -13,8 +13,8 @@ import numpy as np
 
 from rigtwin.components import PUSHERS, Guide, Mass, PositionActuator, Rotor, Schedule, component_of
 from rigtwin.components.conditioning import actuator, condition_all, hold
-from rigtwin.components.guide import friction
 from rigtwin.components.plant import Plant, select
+from rigtwin.components.resistance import resistance_of
 from rigtwin.components.schedule import follow, scheduled_force
 from rigtwin.components.sensors import Sensor, sensor_of
 from rigtwin.components.servo import push_all, push_law, pusher_of
@@ -23,7 +23,7 @@ from rigtwin.description.machine import Machine, ReplayOf
 from rigtwin.models.following import follow_command
 from rigtwin.models.joint_control import JointControl
 from rigtwin.models.joint_inverse import inverse_dynamics
-from rigtwin.models.joint_motion import RIGID, Drive, Inertia, Resistance, integrate_pushed
+from rigtwin.models.joint_motion import RIGID, Drive, Inertia, integrate_pushed
 from rigtwin.models.joint_start import AT_REST, JointStart
 from rigtwin.models.measured_motion import ELASTIC, recover_motion, softest_contact
 from rigtwin.models.start import Start
@@ -160,7 +160,7 @@ class JointSimulation:
         # of types.
         guide = Guide(*(float(value) for value in guide))
         mass = max(float(mass), LIGHTEST)
-        return guide, Inertia(mass, joint.positions[0], spacing, load, joint.rest, joint.goes_round)
+        return guide, Inertia(mass, joint.positions[0], spacing, load, joint.goes_round)
 
     def _share_of_mass(self, plant: Plant) -> float:
         """Return the factor on the mass of the MJCF's bodies.
@@ -298,22 +298,17 @@ class JointSimulation:
         """
         guide, inertia = self.mechanics(plant)
         force = np.zeros(motion.shape[1])
-        inverse_dynamics(
-            guide=guide,
-            dry_friction=friction(guide),
-            inertia=inertia,
-            spring=1.0 / self._softest(guide, inertia, motion[0], motion[2], error),
-            period=self.interval,
-            motion=motion,
-            out=force,
-        )
+        spring = 1.0 / self._softest(guide, inertia, motion[0], motion[2], error)
+        resistance = resistance_of(guide, spring, self._replay.joint.rest, self.interval)
+        inverse_dynamics(resistance, inertia, motion, force)
         return force
 
     def _softest(
         self, guide: Guide, inertia: Inertia, position: Array, acceleration: Array, error: float
     ) -> float:
         """Return the compliance in series with dry friction, m/N; see `softest_contact`."""
-        carried_load = inertia.mass * acceleration + guide.stiffness * (position - inertia.rest)
+        stretch = position - self._replay.joint.rest
+        carried_load = inertia.mass * acceleration + guide.stiffness * stretch
         return softest_contact(guide, carried_load, position, error)
 
     def integrate_pushed(
@@ -345,8 +340,7 @@ class JointSimulation:
         # Dry friction without a spring of its own gets the stiffest one that the step resolves.
         rigid = RIGID * inertia.mass / h**2
         spring = rigid if guide.compliance <= 0.0 else min(1.0 / guide.compliance, rigid)
-        share = h / (guide.relaxation + h)
-        resistance = Resistance(guide, friction(guide), spring, inertia.rest, share)
+        resistance = resistance_of(guide, spring, self._replay.joint.rest, h)
         mover = pusher_of(plant, self.mover.name)
         law, conditioning = push_law(mover), actuator(mover, plant.computer, h)
 

@@ -278,6 +278,14 @@ def stiffness_ratio(now: RigContacts, deflection: float) -> float:
 
 
 @compilable
+def cogging_force(now: RigContacts, travel: float) -> float:
+    """Return the motor's cogging at a travel of the suspension, m: N."""
+    if now.cogging == 0.0:
+        return 0.0
+    return now.cogging * math.sin(2.0 * math.pi * travel / now.cogging_pitch + now.cogging_phase)
+
+
+@compilable
 def touch(mechanics: Handles, now: RigContacts) -> None:
     """Write dry friction, cogging and tyre stiffness of the current motion into the mechanics."""
     if not now.changing:
@@ -295,8 +303,7 @@ def touch(mechanics: Handles, now: RigContacts) -> None:
         mechanics.applied[mechanics.carriage] -= spring_force(now.gas, -travel)
     forward, backward = breakaway(now.motor, now.motor_gap, travel, sliding, load)
     mechanics.motor_friction[0] = 0.5 * (forward + backward)
-    cogging = now.cogging * math.sin(2.0 * math.pi * travel / now.cogging_pitch + now.cogging_phase)
-    mechanics.motor_bias[0] = cogging + 0.5 * (backward - forward)
+    mechanics.motor_bias[0] = cogging_force(now, travel) + 0.5 * (backward - forward)
     deflection = max(mechanics.qpos[mechanics.ground] - carriage, 0.0)
     mechanics.tyre[0] = -mechanics.tyre_scale * now.stiffness * stiffness_ratio(now, deflection)
 

@@ -15,8 +15,9 @@ import numpy as np
 from rigtwin.components import Guide
 from rigtwin.components.conditioning import actuator, condition, hold
 from rigtwin.components.guide import damping, dry_limits, friction, position_force, slide
-from rigtwin.components.mount import give_way
+from rigtwin.components.mount import MountState, give_way
 from rigtwin.components.plant import Plant
+from rigtwin.components.resistance import resistance_of
 from rigtwin.components.servo import pull, push, push_law, pusher_of
 from rigtwin.description.control import FormulaControl
 from rigtwin.models.commanding import (
@@ -78,8 +79,9 @@ class MujocoModel(JointSimulation):
         out = np.zeros((4, len(position)))
         out[0], out[1] = position, velocity
         slider, viscous = float(position[0]), 0.0
-        share = self._period / (guide.relaxation + self._period)
-        inner, speed = slider, 0.0
+        rest = self._replay.joint.rest
+        resistance = resistance_of(guide, 1.0 / softest, rest, self._period)
+        share, behind = resistance.share, MountState(slider, 0.0, slider, viscous)
         for tick in range(len(position)):
             x, v = float(position[tick]), float(velocity[tick])
             data.qpos[place], data.qvel[at] = x, v
@@ -89,24 +91,10 @@ class MujocoModel(JointSimulation):
             mujoco.mj_inverse(model, data)
             load = float(data.qfrc_inverse[at])
             if guide.mount_compliance > 0.0:
-                within, slider, viscous, held_back = give_way(
-                    guide=guide,
-                    dry_friction=dry,
-                    spring=1.0 / softest,
-                    rest=inertia.rest,
-                    share=share,
-                    period=self._period,
-                    inner=inner,
-                    speed=speed,
-                    slider=slider,
-                    viscous=viscous,
-                    load=load,
-                    outer=x,
-                )
-                inner, speed = within, (within - inner) / self._period
+                behind, held_back = give_way(resistance, behind, load, x)
                 out[2, tick] = load + held_back
                 continue
-            load += position_force(guide, x, inertia.rest)
+            load += position_force(guide, x, rest)
             forward, backward = dry_limits(dry, v, load)
             rubbed, by = slide(x - slider, 0.5 * guide.backlash, 1.0 / softest, forward, backward)
             slider += by
@@ -122,7 +110,8 @@ class MujocoModel(JointSimulation):
         model, data, place, at = self._mechanics(plant, h)
         guide, inertia = self.mechanics(plant)
         data.qpos[place], data.qvel[at] = self._start_of(plant)
-        passive = _Passive(guide, h, inertia, float(data.qpos[place]))
+        rest = self._replay.joint.rest
+        passive = _Passive(guide, h, inertia, rest, float(data.qpos[place]))
         mover = pusher_of(plant, self.mover.name)
         drive = actuator(mover, plant.computer, h)
         held = hold(drive, float(self._command[0]))
@@ -188,15 +177,18 @@ class MujocoModel(JointSimulation):
 class _Passive:
     """What a guide does to its joint over a timestep."""
 
-    def __init__(self, guide: Guide, timestep: float, inertia: Inertia, position: float) -> None:
-        self._guide, self._dry, self._rest = guide, friction(guide), inertia.rest
+    def __init__(
+        self, guide: Guide, timestep: float, inertia: Inertia, rest: float, position: float
+    ) -> None:
+        self._guide, self._dry, self._rest = guide, friction(guide), rest
         # As stiff as an explicit step bears, where the description gives a play no spring.
         self._spring = STIFF * inertia.mass / timestep**2
         if guide.compliance > 0.0:
             self._spring = min(self._spring, 1.0 / guide.compliance)
         self._slider, self._viscous = position, 0.0
-        self._inner, self._speed, self._timestep = position, 0.0, timestep
-        self._share = timestep / (guide.relaxation + timestep)
+        self._resistance = resistance_of(guide, self._spring, rest, timestep)
+        self._share = self._resistance.share
+        self._behind = MountState(position, 0.0, position, 0.0)
 
     def act(
         self, model: mujoco.MjModel, data: mujoco.MjData, at: int, x: float, v: float, load: float
@@ -226,19 +218,5 @@ class _Passive:
 
     def _hold_back(self, x: float, load: float) -> float:
         """The force of a guide behind its mount."""
-        place, self._slider, self._viscous, force = give_way(
-            guide=self._guide,
-            dry_friction=self._dry,
-            spring=self._spring,
-            rest=self._rest,
-            share=self._share,
-            period=self._timestep,
-            inner=self._inner,
-            speed=self._speed,
-            slider=self._slider,
-            viscous=self._viscous,
-            load=load,
-            outer=x,
-        )
-        self._inner, self._speed = place, (place - self._inner) / self._timestep
+        self._behind, force = give_way(self._resistance, self._behind, load, x)
         return force

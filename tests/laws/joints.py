@@ -8,11 +8,11 @@ import numpy as np
 from controllers.formula import formula
 from rigtwin.components import Computer, ForceActuator, Guide, PositionSensor, Pusher
 from rigtwin.components.conditioning import actuator, hold
-from rigtwin.components.guide import friction
+from rigtwin.components.resistance import resistance_of
 from rigtwin.components.sensors import start_transducer, transducer
 from rigtwin.components.servo import push_law
 from rigtwin.models.joint_inverse import inverse_dynamics
-from rigtwin.models.joint_motion import Drive, Inertia, Loop, Resistance, integrate_pushed
+from rigtwin.models.joint_motion import Drive, Inertia, Loop, integrate_pushed
 from rigtwin.numerics.arrays import Array
 
 PERIOD = 1e-3
@@ -23,9 +23,9 @@ STIFF = 1e9
 """Stiffness of the spring in series with dry friction that counts as rigid, N/m."""
 
 
-def inertia_of(mass: float, load: float = 0.0, rest: float = 0.0) -> Inertia:
-    """Return a mass in kg under a constant load in N; its guide's spring is slack at `rest`, m."""
-    return Inertia(mass, -10.0, 20.0, np.full(2, load), rest, turns=False)
+def inertia_of(mass: float, load: float = 0.0) -> Inertia:
+    """Return a mass in kg under a constant load in N."""
+    return Inertia(mass, -10.0, 20.0, np.full(2, load), turns=False)
 
 
 def force_to_move(
@@ -40,8 +40,8 @@ def force_to_move(
     speed = np.gradient(position, PERIOD)
     motion = np.ascontiguousarray(np.stack([position, speed, np.gradient(speed, PERIOD)]))
     force = np.empty(len(position))
-    inertia = inertia_of(mass, load, rest)
-    inverse_dynamics(guide, friction(guide), inertia, spring, PERIOD, motion, force)
+    resistance = resistance_of(guide, spring, rest, PERIOD)
+    inverse_dynamics(resistance, inertia_of(mass, load), motion, force)
     return force
 
 
@@ -80,7 +80,7 @@ def motion_under(
     motion = np.zeros((4, len(command)))
     motion[3] = command
     integrate_pushed(
-        resistance=Resistance(guide, friction(guide), spring, 0.0),
+        resistance=resistance_of(guide, spring, 0.0, PERIOD / steps),
         inertia=inertia_of(mass, load),
         start=start,
         drive=Drive(push_law(of), conditioning, hold(conditioning, float(command[0]))),
