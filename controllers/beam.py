@@ -157,7 +157,7 @@ def all_modes(settings: Settings) -> tuple[Array, Array]:
 def modes(settings: Settings, period: float) -> Modes:
     """Return the symmetric modes, sampled exactly for a force held over a period, s."""
     beam_settings = {
-        name: getattr(settings, name) for name in Settings._fields if name.startswith("beam_")
+        name: value for name, value in settings._asdict().items() if name.startswith("beam_")
     }
     # A diagnosis makes hundreds of controllers with equal beams: the cache key keeps only what
     # the modes depend on.

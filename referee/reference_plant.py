@@ -469,7 +469,7 @@ class ReferenceBody(NamedTuple):
     Attributes
     ----------
     motion : ndarray
-        Entries of `ENTRIES`, shape (19,).
+        Motion of the rig, entries as named below, shape (19,).
     histories : ndarray
         Rings of past commands: voltage, ground, structure, shape (3, 2048).
     memories : ndarray
@@ -491,37 +491,14 @@ class ReferenceBody(NamedTuple):
     structure_z: Array
 
 
-ENTRIES = (
-    *(
-        "ground",
-        "structure",
-        "position",
-        "velocity",
-        "force",
-        "relaxed",
-        "bristle_rail",
-        "bristle_rod",
-        "rail_end",
-        "rod_end",
-    ),
-    *(
-        "ground_yield",
-        "structure_yield",
-        "ground_before",
-        "structure_before",
-        "acceleration",
-        "cell",
-        "steps",
-        "ground_piston",
-        "structure_piston",
-    ),
-)
-"""Entries of `Body.motion`, in m, N and s.
-
-They are the plates, the carriage, the motor force, the relaxed part of the tyre, the bristles, the
-ends of the play, the yielding now and a step ago, the acceleration of the carriage, the load cell,
-the number of steps, and the pistons.
-"""
+# Entries of `ReferenceBody.motion`, in m, N and s.
+GROUND, STRUCTURE, POSITION, VELOCITY, FORCE = range(5)  # Plates, carriage, motor force.
+RELAXED, BRISTLE_RAIL, BRISTLE_ROD = range(5, 8)  # Relaxed deflection of the tyre, bristles.
+RAIL_END, ROD_END = range(8, 10)  # Trailing ends of the play of rail and rod.
+GROUND_YIELD, STRUCTURE_YIELD = range(10, 12)  # Yielding of the plates.
+GROUND_BEFORE, STRUCTURE_BEFORE = range(12, 14)  # The same a step ago.
+ACCELERATION, CELL, STEPS = range(14, 17)  # Acceleration of the carriage, load cell, steps so far.
+GROUND_PISTON, STRUCTURE_PISTON = range(17, 19)  # Pistons of the cylinders.
 
 
 @numba.njit(cache=True, nogil=True)
@@ -553,9 +530,10 @@ def at_rest(
     body.memories[1, 0] = body.memories[1, 1] = first[1] * truth.ground.gain
     body.memories[2, 0] = body.memories[2, 1] = first[2] * truth.structure.gain
     body.memories[1, 2], body.memories[2, 2] = first[1], first[2]
-    body.motion[0], body.motion[1], body.motion[2], body.motion[8] = ground, x, x, x
-    body.motion[4] = body.motion[15] = preload
-    body.motion[17], body.motion[18] = ground, x
+    motion = body.motion
+    motion[GROUND], motion[STRUCTURE], motion[POSITION], motion[RAIL_END] = ground, x, x, x
+    motion[FORCE] = motion[CELL] = preload
+    motion[GROUND_PISTON], motion[STRUCTURE_PISTON] = ground, x
     return body
 
 
@@ -563,8 +541,9 @@ def at_rest(
 def true_values(body: ReferenceBody) -> tuple[float, float, float, float]:
     """Return the readings of ideal sensors: ground, structure and travel, m, and load cell, N."""
     motion = body.motion
-    ground, structure = motion[0] + motion[10], motion[1] + motion[11]
-    return ground, structure, structure - motion[2], motion[15]
+    ground = motion[GROUND] + motion[GROUND_YIELD]
+    structure = motion[STRUCTURE] + motion[STRUCTURE_YIELD]
+    return ground, structure, structure - motion[POSITION], motion[CELL]
 
 
 @numba.njit(cache=True, nogil=True)
@@ -576,7 +555,7 @@ def sample(truth: Truth, body: ReferenceBody, tick: int, noise: Array, out: Arra
         out[number] = reading(
             sensors[number],
             values[number],
-            body.motion[14],
+            body.motion[ACCELERATION],
             body.sensed[number],
             body.lags[number],
             tick,
@@ -629,162 +608,166 @@ def bristle_force(
 
 
 @numba.njit(cache=True, nogil=True)
+def drive_actuators(
+    truth: Truth, body: ReferenceBody, commands: Array, time: float
+) -> tuple[float, float, float]:
+    """Advance the commands' paths and the pistons by one step.
+
+    Returns the voltage, V, and the next positions of ground and structure plate, m.
+    """
+    motion, count = body.motion, int(body.motion[STEPS])
+    voltage = pass_command(
+        truth.voltage,
+        body.memories[0],
+        body.histories[0],
+        count,
+        commands[3],
+        True,
+        time,
+        truth.computation_delay,
+    )
+    # The amplifier ends at ±10 V, the motor at ±1860 N.
+    voltage = max(
+        -1860.0 / truth.motor_constant,
+        min(1860.0 / truth.motor_constant, max(-10.0, min(10.0, voltage))),
+    )
+    ground_command = pass_command(
+        truth.ground,
+        body.memories[1],
+        body.histories[1],
+        count,
+        commands[0],
+        False,
+        time,
+        truth.computation_delay,
+    )
+    structure_command = pass_command(
+        truth.structure,
+        body.memories[2],
+        body.histories[2],
+        count,
+        commands[1],
+        False,
+        time,
+        truth.computation_delay,
+    )
+    motion[STEPS] = count + 1
+    motion[GROUND_PISTON] = hydraulic_step(
+        truth.ground_hydraulic, body.ground_z, motion[GROUND_PISTON], ground_command
+    )
+    motion[STRUCTURE_PISTON] = hydraulic_step(
+        truth.structure_hydraulic, body.structure_z, motion[STRUCTURE_PISTON], structure_command
+    )
+    ground = take_up(truth.ground_hydraulic, motion[GROUND], motion[GROUND_PISTON])
+    structure = take_up(truth.structure_hydraulic, motion[STRUCTURE], motion[STRUCTURE_PISTON])
+    return voltage, ground, structure
+
+
+@numba.njit(cache=True, nogil=True)
+def friction_bounds(
+    truth: Truth, motion: Array, sliding: float, rod_position: float
+) -> tuple[float, float, float, float]:
+    """Return the bounds of dry friction, N: the rail's up and down, the rod's up and down.
+
+    sliding, rod_position: velocity, m/s, and position, m, of the plate against the carriage.
+    """
+    x = motion[POSITION]
+    rail_up, rail_down = dry_bounds(truth.rail, motion[VELOCITY], x)
+    rod_up, rod_down = dry_bounds(truth.motor, sliding, rod_position)
+    # Friction behind a play is felt only at the play's ends.
+    if truth.rail.play > 0.0:
+        motion[RAIL_END], up, down = end_of_play(truth.rail.play, x, motion[RAIL_END])
+        rail_up, rail_down = rail_up if up else 0.0, rail_down if down else 0.0
+    if truth.motor.play > 0.0:
+        motion[ROD_END], up, down = end_of_play(truth.motor.play, rod_position, motion[ROD_END])
+        rod_up, rod_down = rod_up if up else 0.0, rod_down if down else 0.0
+    return rail_up, rail_down, rod_up, rod_down
+
+
+@numba.njit(cache=True, nogil=True)
+def move_carriage(
+    truth: Truth,
+    motion: Array,
+    plate: float,
+    push: float,
+    bounds: tuple[float, float, float, float],
+) -> tuple[float, float, float]:
+    """Return the next velocity of the carriage, m/s, and the rod's viscous and dry friction, N.
+
+    plate: velocity of the structure plate, m/s; push: all other forces on the carriage, N; bounds:
+    of dry friction, by `friction_bounds`.
+    """
+    v, (rail_up, rail_down, rod_up, rod_down) = motion[VELOCITY], bounds
+    if truth.bristle <= 0.0:
+        return slide(truth, v, plate, push, rail_up, rail_down, rod_up, rod_down)
+    sliding = plate - v
+    viscous = truth.motor.viscous * sliding + truth.motor.drag * sliding * abs(sliding)
+    bound = rail_up if v > 0.0 else rail_down
+    rail_force, motion[BRISTLE_RAIL] = bristle_force(
+        truth.bristle, truth.mass, motion[BRISTLE_RAIL], v, bound
+    )
+    bound = rod_up if sliding > 0.0 else rod_down
+    rod_force, motion[BRISTLE_ROD] = bristle_force(
+        truth.bristle, truth.mass, motion[BRISTLE_ROD], sliding, bound
+    )
+    v += STEP / truth.mass * (push + viscous - rail_force + rod_force)
+    return v, viscous, rod_force
+
+
+@numba.njit(cache=True, nogil=True)
+def advance_step(truth: Truth, body: ReferenceBody, commands: Array, time: float) -> None:
+    """Advance the rig by one step; arguments as in `advance`."""
+    motion, yielding = body.motion, truth.structure_hydraulic.compliance > 0.0
+    voltage, next_ground, next_structure = drive_actuators(truth, body, commands, time)
+    ground, structure, x, v = motion[GROUND], motion[STRUCTURE], motion[POSITION], motion[VELOCITY]
+    ground_yield, structure_yield = motion[GROUND_YIELD], motion[STRUCTURE_YIELD]
+    # Forces on the carriage at the old position, with the velocities over this step. Rates over
+    # this step come from differences, so yielding and play are included.
+    squeeze = (next_ground - ground + ground_yield - motion[GROUND_BEFORE]) / STEP - v
+    tyre, motion[RELAXED] = tyre_force(truth, ground + ground_yield - x, squeeze, motion[RELAXED])
+    plate = (next_structure - structure + structure_yield - motion[STRUCTURE_BEFORE]) / STEP
+    rod_position = structure + structure_yield - x
+    ripple = truth.ripple * math.sin(
+        2.0 * math.pi * rod_position / truth.ripple_pitch + truth.ripple_phase
+    )
+    bounds = friction_bounds(truth, motion, plate - v, rod_position)
+    smooth_rail = truth.rail.viscous * v + truth.rail.drag * v * abs(v)
+    carriage_force = tyre - motion[FORCE] - ripple - smooth_rail
+    unloaded, load = (next_structure - structure) / STEP, 0.0
+    if yielding:
+        pull = motion[FORCE] + ripple
+        load = plate_under_load(truth, v, unloaded, structure_yield, pull, carriage_force, *bounds)
+        compression = truth.structure_hydraulic.compliance * load - structure_yield
+        plate = unloaded + compression / (truth.load_lag + STEP)
+    motion[VELOCITY], smooth_rod, rod_force = move_carriage(
+        truth, motion, plate, carriage_force, bounds
+    )
+    # The acceleration feeds the crosstalk of the load cell.
+    motion[ACCELERATION] = (motion[VELOCITY] - v) / STEP
+    motion[POSITION] += STEP * motion[VELOCITY]
+    # Exact step of the motor's lag, with the voltage constant over it.
+    motion[FORCE] += (1.0 - math.exp(-STEP / truth.electrical_lag)) * (
+        truth.motor_constant * voltage - motion[FORCE]
+    )
+    motion[CELL] = motion[FORCE] + ripple - smooth_rod - rod_force
+    # The yielding of a step ago gives the plate's velocity in the next step.
+    motion[GROUND_BEFORE], motion[STRUCTURE_BEFORE] = ground_yield, structure_yield
+    motion[GROUND_YIELD] += (
+        STEP / (truth.load_lag + STEP) * (-truth.ground_hydraulic.compliance * tyre - ground_yield)
+    )
+    if yielding:
+        motion[STRUCTURE_YIELD] += STEP * (plate - unloaded)
+        # If rod and rail both stick, only the deflection of the plate determines the force.
+        motion[CELL] = load
+    motion[GROUND], motion[STRUCTURE] = next_ground, next_structure
+
+
+@numba.njit(cache=True, nogil=True)
 def advance(truth: Truth, body: ReferenceBody, commands: Array, time: float) -> None:
     """Advance the rig by one tick.
 
     commands: ground, m, structure, m, force, N, which is ignored, and voltage, V, shape (4,); time:
     of the tick, s.
     """
-    motion, histories, memories = body.motion, body.histories, body.memories
-    ground_z, structure_z, held = body.ground_z, body.structure_z, commands
-    ground, structure, x, v, force, relaxed = (
-        motion[0],
-        motion[1],
-        motion[2],
-        motion[3],
-        motion[4],
-        motion[5],
-    )
-    bristle_rail, bristle_rod, rail_end, rod_end = motion[6], motion[7], motion[8], motion[9]
-    ground_yield, structure_yield, ground_before, structure_before = (
-        motion[10],
-        motion[11],
-        motion[12],
-        motion[13],
-    )
-    acceleration, cell, count = motion[14], motion[15], int(motion[16])
     for _ in range(round(1e-3 / STEP)):
-        voltage = pass_command(
-            truth.voltage,
-            memories[0],
-            histories[0],
-            count,
-            held[3],
-            True,
-            time,
-            truth.computation_delay,
-        )
-        # The amplifier ends at ±10 V, the motor at ±1860 N.
-        voltage = max(
-            -1860.0 / truth.motor_constant,
-            min(1860.0 / truth.motor_constant, max(-10.0, min(10.0, voltage))),
-        )
-        ground_command = pass_command(
-            truth.ground,
-            memories[1],
-            histories[1],
-            count,
-            held[0],
-            False,
-            time,
-            truth.computation_delay,
-        )
-        structure_command = pass_command(
-            truth.structure,
-            memories[2],
-            histories[2],
-            count,
-            held[1],
-            False,
-            time,
-            truth.computation_delay,
-        )
-        count += 1
-        motion[17] = hydraulic_step(truth.ground_hydraulic, ground_z, motion[17], ground_command)
-        motion[18] = hydraulic_step(
-            truth.structure_hydraulic, structure_z, motion[18], structure_command
-        )
-        next_ground = take_up(truth.ground_hydraulic, ground, motion[17])
-        next_structure = take_up(truth.structure_hydraulic, structure, motion[18])
-
-        # Forces on the carriage at the old position, with the velocities over this step.
-        deflection = ground + ground_yield - x
-        # Rates over this step come from differences, so yielding and play are included.
-        squeeze = (next_ground - ground + ground_yield - ground_before) / STEP - v
-        tyre, relaxed = tyre_force(truth, deflection, squeeze, relaxed)
-
-        plate = (next_structure - structure + structure_yield - structure_before) / STEP
-        rod_position = structure + structure_yield - x
-        sliding = plate - v
-        ripple = truth.ripple * math.sin(
-            2.0 * math.pi * rod_position / truth.ripple_pitch + truth.ripple_phase
-        )
-        rail_up, rail_down = dry_bounds(truth.rail, v, x)
-        rod_up, rod_down = dry_bounds(truth.motor, sliding, rod_position)
-        if truth.rail.play > 0.0:
-            rail_end, up, down = end_of_play(truth.rail.play, x, rail_end)
-            rail_up, rail_down = rail_up if up else 0.0, rail_down if down else 0.0
-        if truth.motor.play > 0.0:
-            rod_end, up, down = end_of_play(truth.motor.play, rod_position, rod_end)
-            rod_up, rod_down = rod_up if up else 0.0, rod_down if down else 0.0
-        smooth_rail = truth.rail.viscous * v + truth.rail.drag * v * abs(v)
-        carriage_force = tyre - force - ripple - smooth_rail
-        previous_v = v
-        unloaded, load = (next_structure - structure) / STEP, 0.0
-        if truth.structure_hydraulic.compliance > 0.0:
-            load = plate_under_load(
-                truth,
-                v,
-                unloaded,
-                structure_yield,
-                force + ripple,
-                carriage_force,
-                rail_up,
-                rail_down,
-                rod_up,
-                rod_down,
-            )
-            compression = truth.structure_hydraulic.compliance * load - structure_yield
-            plate = unloaded + compression / (truth.load_lag + STEP)
-        sliding = plate - v
-        smooth_rod = truth.motor.viscous * sliding + truth.motor.drag * sliding * abs(sliding)
-        if truth.bristle > 0.0:
-            bound = rail_up if v > 0.0 else rail_down
-            rail_force, bristle_rail = bristle_force(
-                truth.bristle, truth.mass, bristle_rail, v, bound
-            )
-            bound = rod_up if sliding > 0.0 else rod_down
-            rod_force, bristle_rod = bristle_force(
-                truth.bristle, truth.mass, bristle_rod, sliding, bound
-            )
-            v += STEP / truth.mass * (carriage_force + smooth_rod - rail_force + rod_force)
-        else:
-            v, smooth_rod, rod_force = slide(
-                truth, v, plate, carriage_force, rail_up, rail_down, rod_up, rod_down
-            )
-        # The acceleration feeds the crosstalk of the load cell.
-        acceleration = (v - previous_v) / STEP
-        x += STEP * v
-        # Exact step of the motor's lag, with the voltage constant over it.
-        force += (1.0 - math.exp(-STEP / truth.electrical_lag)) * (
-            truth.motor_constant * voltage - force
-        )
-        cell = force + ripple - smooth_rod - rod_force
-        # The yielding of a step ago gives the plate's velocity in the next step.
-        ground_before, structure_before = ground_yield, structure_yield
-        ground_yield += (
-            STEP
-            / (truth.load_lag + STEP)
-            * (-truth.ground_hydraulic.compliance * tyre - ground_yield)
-        )
-        if truth.structure_hydraulic.compliance > 0.0:
-            structure_yield += STEP * (plate - unloaded)
-            # If rod and rail both stick, only the deflection of the plate determines the force.
-            cell = load
-        ground, structure = next_ground, next_structure
-    motion[0], motion[1], motion[2], motion[3], motion[4], motion[5] = (
-        ground,
-        structure,
-        x,
-        v,
-        force,
-        relaxed,
-    )
-    motion[6], motion[7], motion[8], motion[9] = bristle_rail, bristle_rod, rail_end, rod_end
-    motion[10], motion[11], motion[12], motion[13] = (
-        ground_yield,
-        structure_yield,
-        ground_before,
-        structure_before,
-    )
-    motion[14], motion[15], motion[16] = acceleration, cell, count
+        advance_step(truth, body, commands, time)

@@ -10,7 +10,7 @@ import pytest
 
 from rigtwin.components import Guide, PositionActuator, with_parameters
 from rigtwin.components.guide import dry_limits, friction, slide
-from rigtwin.components.resistance import resistance_of
+from rigtwin.components.guide_step import guide_step_of
 from rigtwin.description.catalogue import find
 from rigtwin.description.machine import Machine
 from rigtwin.models.following import follow_command
@@ -29,7 +29,7 @@ def moved(guide: Guide, position: np.ndarray, mass: float = 0.0, spring: float =
     motion = np.ascontiguousarray(np.stack([position, velocity, np.gradient(velocity, PERIOD)]))
     out = np.empty(len(position))
     inertia = Inertia(mass, -1.0, 2.0, np.zeros(2), turns=False)
-    inverse_dynamics(resistance_of(guide, spring, 0.0, PERIOD), inertia, motion, out)
+    inverse_dynamics(guide_step_of(guide, spring, 0.0, PERIOD), inertia, motion, out)
     return out
 
 

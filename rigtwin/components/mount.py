@@ -24,7 +24,7 @@ from rigtwin.components.guide import (
     position_force,
     slide,
 )
-from rigtwin.components.resistance import Resistance
+from rigtwin.components.guide_step import GuideStep
 
 MOST = 60
 """Largest number of search steps. None is needed where only dry friction is nonlinear."""
@@ -44,13 +44,13 @@ class MountState(NamedTuple):
 
 @compilable
 def resist_at(
-    resistance: Resistance, state: MountState, limits: tuple[float, float], position: float
+    guide_step: GuideStep, state: MountState, limits: tuple[float, float], position: float
 ) -> tuple[float, float, float]:
     """Return the force f(p) of a guide at a position p after a step.
 
     Parameters
     ----------
-    resistance, state
+    guide_step, state
         Guide, and its state before the step.
     limits
         Limits of the dry friction against positive and negative motion, N.
@@ -62,24 +62,24 @@ def resist_at(
     tuple
         Force, N, motion of the friction element, m, and viscous force, N.
     """
-    guide, viscous = resistance.guide, state.viscous
-    v = (position - state.inner) / resistance.step
+    guide, viscous = guide_step.guide, state.viscous
+    v = (position - state.inner) / guide_step.step
     half = 0.5 * guide.backlash
-    dry, by = slide(position - state.slider, half, resistance.spring, limits[0], limits[1])
-    relaxed = viscous + resistance.share * (damping(guide, v) * v - viscous)
-    force = position_force(guide, position, resistance.rest) + dry + relaxed
+    dry, by = slide(position - state.slider, half, guide_step.spring, limits[0], limits[1])
+    relaxed = viscous + guide_step.share * (damping(guide, v) * v - viscous)
+    force = position_force(guide, position, guide_step.rest) + dry + relaxed
     return force + guide.drag * v * abs(v), by, relaxed
 
 
 @compilable
 def give_way(
-    resistance: Resistance, state: MountState, load: float, outer: float
+    guide_step: GuideStep, state: MountState, load: float, outer: float
 ) -> tuple[MountState, float]:
     """Move a guide behind its mount, whose other end is at a given position.
 
     Parameters
     ----------
-    resistance, state
+    guide_step, state
         Guide, and its state before the step. Its velocity sets the limits of dry friction.
     load
         Force that the guide transmits in addition, N.
@@ -91,11 +91,11 @@ def give_way(
     tuple
         State of the guide after the step, and its force on the mount, N.
     """
-    guide = resistance.guide
-    limits = dry_limits(resistance.dry_friction, state.speed, load)
+    guide = guide_step.guide
+    limits = dry_limits(guide_step.dry_friction, state.speed, load)
     compliance = guide.mount_compliance
-    position, slope = guess_position(resistance, state, limits, outer)
-    force, by, relaxed = resist_at(resistance, state, limits, position)
+    position, slope = guess_position(guide_step, state, limits, outer)
+    force, by, relaxed = resist_at(guide_step, state, limits, position)
     error = position + compliance * force - outer
     # The mismatch p + c·f(p) − x has a slope of at least 1, so the equilibrium is no further away
     # than the mismatch itself. Only cogging and a curve may fall with p, by twice their amplitudes
@@ -115,20 +115,20 @@ def give_way(
         following = position - error / slope
         if halve or not low < following < high:
             following = 0.5 * (low + high)
-        force, by, relaxed = resist_at(resistance, state, limits, following)
+        force, by, relaxed = resist_at(guide_step, state, limits, following)
         changed = following + compliance * force - outer
         if following != position:
             slope = max((changed - error) / (following - position), 1.0)
         # A falling force can trap the secant on one side: bisect wherever it gains little.
         halve = waves > 0.0 and abs(changed) > 0.5 * abs(error)
         position, error = following, changed
-    speed = (position - state.inner) / resistance.step
+    speed = (position - state.inner) / guide_step.step
     return MountState(position, speed, state.slider + by, relaxed), force
 
 
 @compilable
 def guess_position(
-    resistance: Resistance, state: MountState, limits: tuple[float, float], outer: float
+    guide_step: GuideStep, state: MountState, limits: tuple[float, float], outer: float
 ) -> tuple[float, float]:
     """Return the equilibrium of guide and mount if only dry friction is nonlinear.
 
@@ -137,7 +137,7 @@ def guess_position(
 
     Parameters
     ----------
-    resistance, state, limits
+    guide_step, state, limits
         Guide, its state and the limits of its dry friction, as in `resist_at`.
     outer
         Position x of the mount's other end, m.
@@ -147,13 +147,13 @@ def guess_position(
     tuple
         Position of the guide, m, and slope of the mismatch p + c·f(p) − x in p.
     """
-    guide, spring, slider = resistance.guide, resistance.spring, state.slider
+    guide, spring, slider = guide_step.guide, guide_step.spring, state.slider
     compliance, half = guide.mount_compliance, 0.5 * guide.backlash
-    along = resistance.share * damping(guide, state.speed) / resistance.step
+    along = guide_step.share * damping(guide, state.speed) / guide_step.step
     rate = along + guide.stiffness
     # Force without dry friction, linear in the position: least + rate·position.
-    least = position_force(guide, state.inner, resistance.rest)
-    least = least + (1.0 - resistance.share) * state.viscous - rate * state.inner
+    least = position_force(guide, state.inner, guide_step.rest)
+    least = least + (1.0 - guide_step.share) * state.viscous - rate * state.inner
     slope = 1.0 + compliance * rate
     up = (outer - compliance * (least + limits[0])) / slope
     if up - slider >= half + limits[0] / spring:

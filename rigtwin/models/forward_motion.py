@@ -25,8 +25,8 @@ from numba.np.unsafe.ndarray import to_fixed_tuple
 from controllers.compiled import inlined
 from rigtwin.components import Guide
 from rigtwin.components.guide import Friction, damping, dry_limits, position_force, slide
+from rigtwin.components.guide_step import GuideStep
 from rigtwin.components.mount import MountState, give_way
-from rigtwin.components.resistance import Resistance
 from rigtwin.components.servo import Push, pull, push
 from rigtwin.models.coupled_friction import rub
 from rigtwin.models.forward_arrays import (
@@ -118,9 +118,9 @@ def hold_back(
     The mount decouples the guide: its force follows from the position alone, and is explicit.
     """
     share, dry = h / (guide.relaxation + h), friction_of(contacts.dry[g])
-    resistance = Resistance(guide, dry, contacts.springs[g], contacts.rests[g], h, share)
+    guide_step = GuideStep(guide, dry, contacts.springs[g], contacts.rests[g], h, share)
     before = MountState(state.inner[g], state.within[g], state.slider[g], state.viscous[g])
-    after, force = give_way(resistance, before, load, place)
+    after, force = give_way(guide_step, before, load, place)
     state.inner[g], state.within[g] = after.inner, after.speed
     state.slider[g], state.viscous[g] = after.slider, after.viscous
     return force

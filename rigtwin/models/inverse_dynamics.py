@@ -23,8 +23,8 @@ from rigtwin.components import Base, Body, Guide, Rotor, Schedule
 from rigtwin.components.body import list_surplus
 from rigtwin.components.effect import Motion
 from rigtwin.components.guide import acts
+from rigtwin.components.guide_step import guide_step_of
 from rigtwin.components.plant import Plant, component_of, select
-from rigtwin.components.resistance import resistance_of
 from rigtwin.components.schedule import follow, scheduled_force
 from rigtwin.components.sensors import apply_sensor, sensor_of
 from rigtwin.description.machine import Machine, ReplayOf, Row
@@ -229,8 +229,8 @@ class InverseDynamicsModel(Model[Plant]):
         out = load.copy()
         at_once = guide.compliance == guide.mount_compliance == guide.backlash == 0.0
         softest = softest_contact(guide, load, guide_motion[0], self._position_error(along))
-        resistance = resistance_of(guide, 1.0 / softest, 0.0, self._interval)
-        (resist_at_once if at_once else resist)(resistance, guide_motion, out)
+        guide_step = guide_step_of(guide, 1.0 / softest, 0.0, self._interval)
+        (resist_at_once if at_once else resist)(guide_step, guide_motion, out)
         return out - load
 
     def _position_error(self, along: Array) -> float:

@@ -27,8 +27,8 @@ from controllers.compiled import compilable, inlined
 from controllers.formula import Program, run
 from rigtwin.components.conditioning import Actuator, ActuatorState, condition
 from rigtwin.components.guide import damping, dry_limits, position_force, slide
+from rigtwin.components.guide_step import GuideStep
 from rigtwin.components.mount import MountState, give_way
-from rigtwin.components.resistance import Resistance
 from rigtwin.components.sensors import Transducer, TransducerState, transduce
 from rigtwin.components.servo import Push, pull, push
 from rigtwin.numerics.arrays import Array
@@ -177,7 +177,7 @@ def push_joint(
 
 @inlined
 def step_joint(
-    resistance: Resistance,
+    guide_step: GuideStep,
     mass: float,
     state: tuple[float, float, float, float],
     pushed: float,
@@ -188,7 +188,7 @@ def step_joint(
 
     Parameters
     ----------
-    resistance
+    guide_step
         What resists the motion.
     mass
         Inertia of the joint, kg.
@@ -204,17 +204,17 @@ def step_joint(
     tuple
         State after the step.
     """
-    guide, spring, (x, v, slider, viscous) = resistance.guide, resistance.spring, state
-    h, share, half = resistance.step, resistance.share, 0.5 * guide.backlash
+    guide, spring, (x, v, slider, viscous) = guide_step.guide, guide_step.spring, state
+    h, share, half = guide_step.step, guide_step.share, 0.5 * guide.backlash
     coefficient = damping(guide, v)
-    load = outer - position_force(guide, x, resistance.rest) - (1.0 - share) * viscous
+    load = outer - position_force(guide, x, guide_step.rest) - (1.0 - share) * viscous
     damped = h * (share * coefficient + guide.drag * abs(v) + held_by)
     # Implicit share of the damping: the midpoint rule's ½ until d·h = 2m, where it would start to
     # oscillate, and more beyond.
     ahead = 1.0 - mass / damped if damped > 2.0 * mass else 0.5
     total = mass + ahead * damped
     rhs = (mass - (1.0 - ahead) * damped) * v + h * load
-    forward, backward = dry_limits(resistance.dry_friction, v, pushed)
+    forward, backward = dry_limits(guide_step.dry_friction, v, pushed)
     # Without dry friction; then with a stretched spring; then with a slider that slides.
     velocity = rhs / total
     stretch_length = x + h * velocity - slider
@@ -232,7 +232,7 @@ def step_joint(
 
 @loop_kernel
 def integrate_pushed(
-    resistance: Resistance,
+    guide_step: GuideStep,
     inertia: Inertia,
     start: tuple[float, float],
     drive: Drive,
@@ -246,7 +246,7 @@ def integrate_pushed(
 
     Parameters
     ----------
-    resistance, inertia
+    guide_step, inertia
         What resists the motion, and inertia of the joint.
     start
         Initial position and velocity, m and m/s.
@@ -264,13 +264,13 @@ def integrate_pushed(
         Position, velocity, actuator force and command, shape (4, ticks). The command is read where
         the loop is open, and all else is written.
     """
-    h, (x, v) = resistance.step, start
-    slider, viscous = x, damping(resistance.guide, v) * v
+    h, (x, v) = guide_step.step, start
+    slider, viscous = x, damping(guide_step.guide, v) * v
     behind = MountState(x, 0.0, slider, viscous)
     law, mass = drive.law, inertia.mass
     follows = law.position_gain > 0.0
     last = drive.held.memory[3] if follows else 0.0
-    yields = resistance.guide.mount_compliance * mass > SHORTEST * h * h
+    yields = guide_step.guide.mount_compliance * mass > SHORTEST * h * h
     for tick in range(len(disturbance)):
         # Sensors read before the tick's command acts.
         out[0, tick], out[1, tick] = x, v
@@ -281,12 +281,12 @@ def integrate_pushed(
             pushed, held_by, last = push_joint(drive, out[3, tick], last, x, v)
             outer = pushed + disturbance[tick] - gravity(inertia, x)
             if yields:
-                behind, held_back = give_way(resistance, behind, pushed, x)
+                behind, held_back = give_way(guide_step, behind, pushed, x)
                 # The mount decouples the guide, whose force is therefore explicit; only a servo's
                 # damping is implicit.
                 v = (v + h * (outer - held_back) / mass) / (1.0 + h * held_by / mass)
                 x += h * v
             else:
                 x, v, slider, viscous = step_joint(
-                    resistance, mass, (x, v, slider, viscous), pushed, held_by, outer
+                    guide_step, mass, (x, v, slider, viscous), pushed, held_by, outer
                 )

@@ -13,8 +13,8 @@ import numpy as np
 
 from rigtwin.components import PUSHERS, Guide, Mass, PositionActuator, Rotor, Schedule, component_of
 from rigtwin.components.conditioning import actuator, condition_all, hold
+from rigtwin.components.guide_step import guide_step_of
 from rigtwin.components.plant import Plant, select
-from rigtwin.components.resistance import resistance_of
 from rigtwin.components.schedule import follow, scheduled_force
 from rigtwin.components.sensors import Sensor, sensor_of
 from rigtwin.components.servo import push_all, push_law, pusher_of
@@ -299,8 +299,8 @@ class JointSimulation:
         guide, inertia = self.mechanics(plant)
         force = np.zeros(motion.shape[1])
         spring = 1.0 / self._softest(guide, inertia, motion[0], motion[2], error)
-        resistance = resistance_of(guide, spring, self._replay.joint.rest, self.interval)
-        inverse_dynamics(resistance, inertia, motion, force)
+        guide_step = guide_step_of(guide, spring, self._replay.joint.rest, self.interval)
+        inverse_dynamics(guide_step, inertia, motion, force)
         return force
 
     def _softest(
@@ -340,7 +340,7 @@ class JointSimulation:
         # Dry friction without a spring of its own gets the stiffest one that the step resolves.
         rigid = RIGID * inertia.mass / h**2
         spring = rigid if guide.compliance <= 0.0 else min(1.0 / guide.compliance, rigid)
-        resistance = resistance_of(guide, spring, self._replay.joint.rest, h)
+        guide_step = guide_step_of(guide, spring, self._replay.joint.rest, h)
         mover = pusher_of(plant, self.mover.name)
         law, conditioning = push_law(mover), actuator(mover, plant.computer, h)
 
@@ -348,7 +348,7 @@ class JointSimulation:
             out = np.zeros((4, len(disturbance)))
             out[3] = self._command[: len(disturbance)]
             integrate_pushed(
-                resistance=resistance,
+                guide_step=guide_step,
                 inertia=inertia,
                 start=start,
                 drive=Drive(law, conditioning, hold(conditioning, float(self._command[0]))),

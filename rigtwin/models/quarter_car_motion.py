@@ -32,7 +32,7 @@ from rigtwin.components.cylinder import (
 )
 from rigtwin.components.gas_spring import spring_force
 from rigtwin.components.guide import breakaway
-from rigtwin.components.yielding import share_of_load, solve_yielding
+from rigtwin.components.yielding import Rod, share_of_load, solve_yielding
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel, loop_kernel
 from rigtwin.simulation.plant import RigContacts, cogging_force, contacts, stiffness_ratio
@@ -295,16 +295,18 @@ def solve_step(
         push, resisted = h * (spring + damping * forces.ground), h * damping
         if yields:
             velocity, cell = solve_yielding(
+                rod=Rod(
+                    free=plate + forces.loss,
+                    share=carriage.shares[1],
+                    force=force + bias,
+                    viscous=carriage.motor_viscous,
+                    forward=forces.rod[0],
+                    backward=forces.rod[1],
+                ),
                 rhs=forces.momentum + h * (forces.pushed - gas) + push,
                 inertia=carriage.mass + h * carriage.rail_viscous + resisted,
                 timestep=h,
                 rail=rail,
-                free=plate + forces.loss,
-                share=carriage.shares[1],
-                force=force + bias,
-                viscous=carriage.motor_viscous,
-                forward=forces.rod[0],
-                backward=forces.rod[1],
             )
         else:
             rhs, total = free + push, inertia + resisted

@@ -28,7 +28,7 @@ from rigtwin.components.cylinder import (
 from rigtwin.components.gas_spring import spring_force
 from rigtwin.components.guide import Friction, breakaway, friction, gap_at
 from rigtwin.components.tyre import SCALE
-from rigtwin.components.yielding import share_of_load, solve_yielding
+from rigtwin.components.yielding import Rod, share_of_load, solve_yielding
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import forward, integrate
 from rigtwin.simulation.mechanics import Handles, build, handles
@@ -355,18 +355,8 @@ def give_way(
     load -= 0.5 * (backward - forward)
     push = tyre - (spring_force(now.gas, -travel) if now.gas.force > 0.0 else 0.0)
     free = structure + (now.structure_unloaded - now.yielded[1]) / (now.structure_lag + h)
-    _, cell = solve_yielding(
-        rhs=now.mass * v + h * push,
-        inertia=inertia,
-        timestep=h,
-        rail=(h * up, h * down),
-        free=free,
-        share=share,
-        force=load,
-        viscous=now.motor_viscous,
-        forward=forward,
-        backward=backward,
-    )
+    rod = Rod(free, share, load, now.motor_viscous, forward, backward)
+    _, cell = solve_yielding(rod, now.mass * v + h * push, inertia, h, (h * up, h * down))
     return ground_ahead, now.yielded[1] + h * (free - structure + share * cell)
 
 

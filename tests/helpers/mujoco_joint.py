@@ -15,9 +15,9 @@ import numpy as np
 from rigtwin.components import Guide
 from rigtwin.components.conditioning import actuator, condition, hold
 from rigtwin.components.guide import damping, dry_limits, friction, position_force, slide
+from rigtwin.components.guide_step import guide_step_of
 from rigtwin.components.mount import MountState, give_way
 from rigtwin.components.plant import Plant
-from rigtwin.components.resistance import resistance_of
 from rigtwin.components.servo import pull, push, push_law, pusher_of
 from rigtwin.description.control import FormulaControl
 from rigtwin.models.commanding import (
@@ -80,8 +80,8 @@ class MujocoModel(JointSimulation):
         out[0], out[1] = position, velocity
         slider, viscous = float(position[0]), 0.0
         rest = self._replay.joint.rest
-        resistance = resistance_of(guide, 1.0 / softest, rest, self._period)
-        share, behind = resistance.share, MountState(slider, 0.0, slider, viscous)
+        guide_step = guide_step_of(guide, 1.0 / softest, rest, self._period)
+        share, behind = guide_step.share, MountState(slider, 0.0, slider, viscous)
         for tick in range(len(position)):
             x, v = float(position[tick]), float(velocity[tick])
             data.qpos[place], data.qvel[at] = x, v
@@ -91,7 +91,7 @@ class MujocoModel(JointSimulation):
             mujoco.mj_inverse(model, data)
             load = float(data.qfrc_inverse[at])
             if guide.mount_compliance > 0.0:
-                behind, held_back = give_way(resistance, behind, load, x)
+                behind, held_back = give_way(guide_step, behind, load, x)
                 out[2, tick] = load + held_back
                 continue
             load += position_force(guide, x, rest)
@@ -186,7 +186,7 @@ class _Passive:
         if guide.compliance > 0.0:
             self._spring = min(self._spring, 1.0 / guide.compliance)
         self._slider, self._viscous = position, 0.0
-        self._resistance = resistance_of(guide, self._spring, rest, timestep)
+        self._resistance = guide_step_of(guide, self._spring, rest, timestep)
         self._share = self._resistance.share
         self._behind = MountState(position, 0.0, position, 0.0)
 

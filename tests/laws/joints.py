@@ -8,7 +8,7 @@ import numpy as np
 from controllers.formula import formula
 from rigtwin.components import Computer, ForceActuator, Guide, PositionSensor, Pusher
 from rigtwin.components.conditioning import actuator, hold
-from rigtwin.components.resistance import resistance_of
+from rigtwin.components.guide_step import guide_step_of
 from rigtwin.components.sensors import start_transducer, transducer
 from rigtwin.components.servo import push_law
 from rigtwin.models.joint_inverse import inverse_dynamics
@@ -40,8 +40,8 @@ def force_to_move(
     speed = np.gradient(position, PERIOD)
     motion = np.ascontiguousarray(np.stack([position, speed, np.gradient(speed, PERIOD)]))
     force = np.empty(len(position))
-    resistance = resistance_of(guide, spring, rest, PERIOD)
-    inverse_dynamics(resistance, inertia_of(mass, load), motion, force)
+    guide_step = guide_step_of(guide, spring, rest, PERIOD)
+    inverse_dynamics(guide_step, inertia_of(mass, load), motion, force)
     return force
 
 
@@ -80,7 +80,7 @@ def motion_under(
     motion = np.zeros((4, len(command)))
     motion[3] = command
     integrate_pushed(
-        resistance=resistance_of(guide, spring, 0.0, PERIOD / steps),
+        guide_step=guide_step_of(guide, spring, 0.0, PERIOD / steps),
         inertia=inertia_of(mass, load),
         start=start,
         drive=Drive(push_law(of), conditioning, hold(conditioning, float(command[0]))),

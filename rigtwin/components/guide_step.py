@@ -1,4 +1,4 @@
-"""Resistance: a guide with all that one step of its motion needs, as compiled code takes it."""
+"""Guide with all that one step of its motion needs, as compiled code takes it."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import NamedTuple
 from rigtwin.components.guide import Friction, Guide, friction
 
 
-class Resistance(NamedTuple):
+class GuideStep(NamedTuple):
     """Guide with all that one step of its motion needs."""
 
     guide: Guide  # Parameters of the guide.
@@ -18,8 +18,8 @@ class Resistance(NamedTuple):
     share: float  # Share by which viscous friction relaxes in the step.
 
 
-def resistance_of(guide: Guide, spring: float, rest: float, step: float) -> Resistance:
-    """Return the resistance of a guide.
+def guide_step_of(guide: Guide, spring: float, rest: float, step: float) -> GuideStep:
+    """Return a guide with all that one step of its motion needs.
 
     Parameters
     ----------
@@ -33,4 +33,4 @@ def resistance_of(guide: Guide, spring: float, rest: float, step: float) -> Resi
         Length of the step, s.
     """
     # Implicit Euler step of T·F' = d·v − F: stable for any relaxation T, and exact for T = 0.
-    return Resistance(guide, friction(guide), spring, rest, step, step / (guide.relaxation + step))
+    return GuideStep(guide, friction(guide), spring, rest, step, step / (guide.relaxation + step))
