@@ -22,6 +22,8 @@ ONSET = 1e-4
 """Deflection over which the contact of the tyre sets in, m."""
 NEVER = 1e9
 """Value of a limit that is never reached."""
+Bounds = tuple[float, float, float, float]
+"""Bounds of dry friction: of the rail in positive and in negative direction, then of the rod."""
 
 
 class ReferenceSlider(NamedTuple):
@@ -218,20 +220,14 @@ def dry_bounds(slider: ReferenceSlider, speed: float, position: float) -> tuple[
 
 
 @numba.njit(cache=True, nogil=True)
-def solve(
-    rhs: float,
-    mass: float,
-    rail_up: float,
-    rail_down: float,
-    rod_up: float,
-    rod_down: float,
-    plate: float,
-) -> float:
+def solve(rhs: float, mass: float, bounds: Bounds, plate: float) -> float:
     """Return the velocity of the carriage after a step, m/s.
 
-    Solves m v + F_rail(v) − F_rod(plate − v) = rhs, with impulses in Ns. The left side rises
-    monotonically with v, with jumps where rail or rod stick, so bisection always converges.
+    Solves m v + F_rail(v) − F_rod(plate − v) = rhs, with rhs and bounds as impulses in Ns. The left
+    side rises monotonically with v, with jumps where rail or rod stick, so bisection always
+    converges.
     """
+    rail_up, rail_down, rod_up, rod_down = bounds
     # No friction can move the carriage beyond these bounds: they bracket the root.
     low = min(0.0, plate, rhs / mass) - (rail_up + rail_down + rod_up + rod_down) / mass - 1e-12
     high = max(0.0, plate, rhs / mass) + (rail_up + rail_down + rod_up + rod_down) / mass + 1e-12
@@ -245,6 +241,7 @@ def solve(
         most += rod_down if guess >= plate else -rod_up
         if least <= 0.0 <= most:
             return guess
+    # 60 halvings of a bracket of some m/s end at the resolution of a double.
     for _ in range(60):
         middle = 0.5 * (low + high)
         value = mass * middle - rhs + (rail_up if middle > 0.0 else -rail_down)
@@ -258,30 +255,18 @@ def solve(
 
 @numba.njit(cache=True, nogil=True)
 def slide(
-    truth: Truth,
-    v: float,
-    plate: float,
-    push: float,
-    rail_up: float,
-    rail_down: float,
-    rod_up: float,
-    rod_down: float,
+    truth: Truth, v: float, plate: float, push: float, bounds: Bounds
 ) -> tuple[float, float, float]:
     """Return the next velocity of the carriage, m/s, and the rod's viscous and dry friction, N.
 
-    v, plate: velocities of carriage and plate, m/s; push: all other forces on the carriage, N.
+    v, plate: velocities of carriage and plate, m/s; push: all other forces on the carriage, N;
+    bounds: of dry friction, N.
     """
+    rail_up, rail_down, rod_up, rod_down = bounds
     sliding = plate - v
     viscous = truth.motor.viscous * sliding + truth.motor.drag * sliding * abs(sliding)
-    next_velocity = solve(
-        truth.mass * v + STEP * (push + viscous),
-        truth.mass,
-        STEP * rail_up,
-        STEP * rail_down,
-        STEP * rod_up,
-        STEP * rod_down,
-        plate,
-    )
+    impulses = (STEP * rail_up, STEP * rail_down, STEP * rod_up, STEP * rod_down)
+    next_velocity = solve(truth.mass * v + STEP * (push + viscous), truth.mass, impulses, plate)
     if next_velocity > plate:
         return next_velocity, viscous, -rod_down
     if next_velocity < plate:
@@ -302,22 +287,19 @@ def plate_under_load(
     deflection: float,
     pull: float,
     push: float,
-    rail_up: float,
-    rail_down: float,
-    rod_up: float,
-    rod_down: float,
+    bounds: Bounds,
 ) -> float:
     """Return the load of a compliant structure plate, N, by bisection; pull: motor force, N.
 
     A greater load lets the plate run ahead, which reduces the load, so the balance is monotone.
     """
     lag = truth.load_lag + STEP
-    reach = rod_up + rod_down + 1.0 + abs(pull)
+    reach = bounds[2] + bounds[3] + 1.0 + abs(pull)
     low, high = pull - reach, pull + reach
     for _ in range(45):
         load = 0.5 * (low + high)
         plate = unloaded + (truth.structure_hydraulic.compliance * load - deflection) / lag
-        _, viscous, dry_force = slide(truth, v, plate, push, rail_up, rail_down, rod_up, rod_down)
+        _, viscous, dry_force = slide(truth, v, plate, push, bounds)
         if load > pull - viscous - dry_force:
             high = load
         else:
@@ -388,8 +370,9 @@ def hydraulic_step(cylinder: Hydraulic, z: Array, plate: float, command: float) 
     b2, b1, b0 = 1817.0 * w**2, 7.719e4 * w**3, 6.243e5 * w**4
     scale = 6.281e5 / 6.243e5
     z0, z1, z2, z3 = z[0], z[1], z[2], z[3]
+    # Midpoint rule: a half step with the slope of the start, a whole one with that of the middle.
     for half in range(2):
-        # Observer form: the output is the first state. Two passes make the midpoint rule.
+        # Observer form: the output is the first state.
         d0 = z1 - a3 * z0
         d1 = z2 - a2 * z0 + scale * b2 * command
         d2 = z3 - a1 * z0 + scale * b1 * command
@@ -523,6 +506,7 @@ def at_rest(
     x = ground - preload / truth.tyre
     settle(body.ground_z, ground, truth.ground_hydraulic)
     settle(body.structure_z, x, truth.structure_hydraulic)
+    # As if these commands had been held for longer than any delay.
     first = (preload / truth.motor_constant, ground_command, structure_command)
     for number in range(3):
         body.histories[number, :] = first[number]
@@ -615,41 +599,17 @@ def drive_actuators(
 
     Returns the voltage, V, and the next positions of ground and structure plate, m.
     """
-    motion, count = body.motion, int(body.motion[STEPS])
-    voltage = pass_command(
-        truth.voltage,
-        body.memories[0],
-        body.histories[0],
-        count,
-        commands[3],
-        True,
-        time,
-        truth.computation_delay,
-    )
+    motion, count, late = body.motion, int(body.motion[STEPS]), truth.computation_delay
+    paths, rings = body.memories, body.histories
+    voltage = pass_command(truth.voltage, paths[0], rings[0], count, commands[3], True, time, late)
     # The amplifier ends at ±10 V, the motor at ±1860 N.
-    voltage = max(
-        -1860.0 / truth.motor_constant,
-        min(1860.0 / truth.motor_constant, max(-10.0, min(10.0, voltage))),
-    )
+    most = 1860.0 / truth.motor_constant
+    voltage = max(-most, min(most, max(-10.0, min(10.0, voltage))))
     ground_command = pass_command(
-        truth.ground,
-        body.memories[1],
-        body.histories[1],
-        count,
-        commands[0],
-        False,
-        time,
-        truth.computation_delay,
+        truth.ground, paths[1], rings[1], count, commands[0], False, time, late
     )
     structure_command = pass_command(
-        truth.structure,
-        body.memories[2],
-        body.histories[2],
-        count,
-        commands[1],
-        False,
-        time,
-        truth.computation_delay,
+        truth.structure, paths[2], rings[2], count, commands[1], False, time, late
     )
     motion[STEPS] = count + 1
     motion[GROUND_PISTON] = hydraulic_step(
@@ -666,7 +626,7 @@ def drive_actuators(
 @numba.njit(cache=True, nogil=True)
 def friction_bounds(
     truth: Truth, motion: Array, sliding: float, rod_position: float
-) -> tuple[float, float, float, float]:
+) -> Bounds:
     """Return the bounds of dry friction, N: the rail's up and down, the rod's up and down.
 
     sliding, rod_position: velocity, m/s, and position, m, of the plate against the carriage.
@@ -690,7 +650,7 @@ def move_carriage(
     motion: Array,
     plate: float,
     push: float,
-    bounds: tuple[float, float, float, float],
+    bounds: Bounds,
 ) -> tuple[float, float, float]:
     """Return the next velocity of the carriage, m/s, and the rod's viscous and dry friction, N.
 
@@ -699,7 +659,7 @@ def move_carriage(
     """
     v, (rail_up, rail_down, rod_up, rod_down) = motion[VELOCITY], bounds
     if truth.bristle <= 0.0:
-        return slide(truth, v, plate, push, rail_up, rail_down, rod_up, rod_down)
+        return slide(truth, v, plate, push, bounds)
     sliding = plate - v
     viscous = truth.motor.viscous * sliding + truth.motor.drag * sliding * abs(sliding)
     bound = rail_up if v > 0.0 else rail_down
@@ -736,7 +696,7 @@ def advance_step(truth: Truth, body: ReferenceBody, commands: Array, time: float
     unloaded, load = (next_structure - structure) / STEP, 0.0
     if yielding:
         pull = motion[FORCE] + ripple
-        load = plate_under_load(truth, v, unloaded, structure_yield, pull, carriage_force, *bounds)
+        load = plate_under_load(truth, v, unloaded, structure_yield, pull, carriage_force, bounds)
         compression = truth.structure_hydraulic.compliance * load - structure_yield
         plate = unloaded + compression / (truth.load_lag + STEP)
     motion[VELOCITY], smooth_rod, rod_force = move_carriage(

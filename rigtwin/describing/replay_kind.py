@@ -74,9 +74,12 @@ def choose_kind(
         return ReplayKind(wanted, "as stated")
     positions = [j for j in joints if _takes_position(mechanism, j)]
     commanded = slots.joints(JointQuantity.COMMAND, joints)
+    # Forces come first: they show the joint's friction, which commands of a position only show
+    # through a servo.
     if len(measured) == len(joints):
         beside = " (position commands are there too: --test servos)" if commanded else ""
         return ReplayKind(INVERSE, f"the force at every joint was measured{beside}")
+    # Every command goes to an actuator that takes a position.
     if commanded and set(commanded) <= set(positions):
         return _position_test(mechanism, commanded)
     pushed = [
@@ -90,6 +93,7 @@ def choose_kind(
             or (joint in commanded and joint not in positions)
         )
     ]
+    # Joints without an actuator move freely; all others must be pushed by something known.
     if pushed and all(actuator_on(mechanism, j) is None or j in pushed for j in joints):
         if set(pushed) <= set(still):
             return ReplayKind(FORCES, "the force is 0 throughout: the joints swing freely")
