@@ -54,8 +54,7 @@ def is_magnitude(force: Array, position: Array) -> bool:
     """
     for values in (force, -force):
         low, high = float(np.min(values)), float(np.max(values))
-        # A force with a sign passes through zero as often as the joint turns back; a magnitude
-        # touches it and returns.
+        # A force with a sign crosses zero where the joint turns back; a magnitude only touches it.
         if high > 0.0 and low == 0.0 and _reversals(position) >= MAGNITUDE_REVERSALS:
             return True
     return False
@@ -67,7 +66,7 @@ def _reversals(position: Array) -> int:
     if step == 0.0:
         return 0
     count, extreme, up = 0, float(position[0]), True
-    # This loop is Python: 4000 samples show every reversal of a tested joint.
+    # The loop runs in Python; 4000 samples are enough for the reversals of a test.
     for value in position[:: max(1, len(position) // 4000)]:
         value = float(value)
         # Hysteresis of a tenth of the stroke: the noise of a resting joint is no reversal.
@@ -218,7 +217,7 @@ def _regress(measured: Array, needed: Array, speed: Array) -> Slope | None:
         for values in (measured, needed)
     )
     power = float(model @ model)
-    # The model's force is itself friction-like, as that of a joint at constant speed: no slope.
+    # The columns of friction explain the model's force too: no slope can be told.
     if power <= 1e-12 * float(needed @ needed):
         return None
     slope = float(residual @ model) / power

@@ -106,7 +106,6 @@ def read_log(
     if log.questions or log.clock is None:
         raise _all_questions(log, signals)
     _note_resting(log, joints)
-    # Where forces are measured, inverse dynamics confirm the signs of positions too.
     if kind.test != INVERSE:
         log.notes.append("positions have the signs of the log")
     idle = [signal.joint for signal in movers if not np.any(log.values(signal))]

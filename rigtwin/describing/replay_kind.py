@@ -74,8 +74,7 @@ def choose_kind(
         return ReplayKind(wanted, "as stated")
     positions = [j for j in joints if _takes_position(mechanism, j)]
     commanded = slots.joints(JointQuantity.COMMAND, joints)
-    # Forces come first: they show the joint's friction, which commands of a position only show
-    # through a servo.
+    # Measured forces come first: they need no model of the actuators.
     if len(measured) == len(joints):
         beside = " (position commands are there too: --test servos)" if commanded else ""
         return ReplayKind(INVERSE, f"the force at every joint was measured{beside}")

@@ -183,7 +183,7 @@ def _common_unit(
     largest = max(max(abs(low), abs(high)) for low, high in worst.values())
     answers = [option("*.position", f"[{unit}]") for unit in (si, small)]
     beyond = next((j for j in joints if not _within(mechanism, j, worst[j], 1.0, turns)), None)
-    # LeRobot writes "NAME.pos" as a share of the range, from −100 to 100: that fits degrees as well.
+    # LeRobot writes "NAME.pos" as a share of the range, from −100 to 100: degrees look the same.
     percent = largest <= LARGEST_PERCENT and all(
         split_words(positions[j])[-1] == "pos" and "." in positions[j] for j in joints
     )

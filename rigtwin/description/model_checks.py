@@ -183,6 +183,7 @@ def check_values(path: Path, model: mujoco.MjModel) -> None:
     model
         Compiled MJCF.
     """
+    # Inertia matrices are dense here: n² numbers, and n³ operations a step.
     if model.nv > MOST_DEGREES:
         raise RigtwinError(
             f"model {path}: it has {model.nv} degrees of freedom; expected at most {MOST_DEGREES}"
@@ -219,6 +220,8 @@ def check_values(path: Path, model: mujoco.MjModel) -> None:
 
 def _arrays(model: mujoco.MjModel) -> Iterator[tuple[str, np.ndarray]]:
     """Yield name and values of every floating-point option and array of a model."""
+    # The bindings list their arrays as attributes only; a list of names would miss those of new
+    # versions.
     for holder, prefix in ((model.opt, "option "), (model, "")):
         for name in dir(holder):
             value = None if name.startswith("_") else getattr(holder, name, None)

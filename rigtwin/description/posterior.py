@@ -202,6 +202,7 @@ def _parse(tables: Mapping[str, Any], nominal: Configuration) -> Posterior:
 
 def _with(nominal: Configuration, where: str, changes: Changes) -> Configuration:
     """Return a configuration with changes, which may concern components alone."""
+    # The same checks as for any other file: bounds, names and types.
     configuration = override(nominal, changes)
     for group in changes:
         if group not in configuration.plant._fields:
@@ -214,6 +215,7 @@ def _with(nominal: Configuration, where: str, changes: Changes) -> Configuration
 
 def _probability(value: object) -> float:
     """Return a probability; raise RigtwinError for any other value."""
+    # bool is an int in Python, but true is no probability.
     if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 <= value <= 1.0:
         raise RigtwinError(f"{POSTERIOR}: probability = {value!r}; expected 0 to 1")
     return float(value)
