@@ -94,6 +94,8 @@ def check(
         try:
             commitment = _await_commitment(referee.stdout, progress)
             (recordings / "commitment.txt").write_text(commitment + "\n")
+            # From here on the key is fixed: the referee only records further tests, and opens it at
+            # the end.
             answers = _diagnose_all(recordings, cases, workers, progress)
             settled = _run_next_tests(recordings, answers, referee.stdin, referee.stdout, workers)
             crude = _crude(recordings, cases, workers) if baselines else {}
@@ -102,6 +104,7 @@ def check(
             raise
         referee.stdin.write("open\n")
         referee.stdin.flush()
+        # The salt keeps the key from being guessed from its hash: a key has few possible values.
         salt = referee.stdout.readline().partition(" ")[2].strip()
         opened = referee.stdout.readline().strip()
     # The key was fixed before the first answer only if its hash matches.
@@ -140,6 +143,8 @@ def _diagnose_all(
             files = [path.read_bytes() for path in _paths(recordings, number)]
             yield keys[number], files
 
+    # Answers are stored by the contents that they are based on, so an equal recording is not
+    # diagnosed twice.
     keys = [_key(recordings, number) for number in range(cases)]
     with Store(recordings / "answers.sqlite") as store:
         run_jobs(store, workers, answer, jobs(), progress)

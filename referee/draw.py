@@ -60,6 +60,7 @@ def _replace_fields(path: str, **values: float) -> Change:
 
 def _log_uniform(random: Random, low: float, high: float) -> float:
     """Draw a number between two bounds, uniform in its logarithm."""
+    # Sizes span decades: a uniform draw would hardly ever give a small one.
     return float(np.exp(random.uniform(np.log(low), np.log(high))))
 
 
@@ -367,6 +368,7 @@ def effect_size(rig: Truth, law: Law, defect: Defect, commands: Array) -> float:
     ):
         return float("inf")
     defective, true_law = defect.change(rig, law)
+    # Without noise on either side, the difference is the defect's alone.
     change = run_quiet(defective, true_law, commands) - run_quiet(rig, law, commands)
     parts = rig._asdict()
     noise = np.array([parts[name].white for name in SENSORS])

@@ -325,6 +325,7 @@ def pass_command(
     play does, as of a position.
     """
     length = len(history)
+    # Rings of 2048 steps hold 0.1 s: no delay of this rig is longer.
     history[count % length] = command
     steps_back = (drive.delay + computation_delay) / STEP
     whole = int(steps_back)
@@ -345,6 +346,7 @@ def pass_command(
             elif wanted < memory[2] - drive.dead_zone:
                 memory[2] = wanted + drive.dead_zone
             wanted = memory[2]
+    # Gain after the dead zone, so that the zone is in the command's own unit.
     wanted *= drive.gain * (1.0 - drive.fading * time / 60.0)
     wanted = max(-drive.limit, min(drive.limit, wanted))
     most = drive.rate * STEP
@@ -382,6 +384,7 @@ def hydraulic_step(cylinder: Hydraulic, z: Array, plate: float, command: float) 
     z[0], z[1], z[2], z[3] = z0, z1, z2, z3
     # The servo valve saturates: the piston follows the linear response up to its largest speed.
     most = cylinder.speed * STEP
+    # A creeping piston drifts however it is commanded, as a leaking valve makes it.
     return plate + max(-most, min(most, z0 - plate)) + cylinder.creep * STEP
 
 
@@ -399,6 +402,7 @@ def take_up(cylinder: Hydraulic, plate: float, piston: float) -> float:
 def settle(z: Array, position: float, cylinder: Hydraulic) -> None:
     """Set the states of a cylinder at rest to a position, m."""
     w, scale = 1.0 - cylinder.slowdown, 6.281e5 / 6.243e5
+    # Steady state of the observer form: every derivative of `hydraulic_step` is zero.
     a3, a2, a1 = 165.9 * w, 6674.0 * w**2, 8.598e4 * w**3
     z[0], z[1] = position, a3 * position
     z[2] = a2 * position - scale * 1817.0 * w**2 * position
@@ -425,6 +429,7 @@ def reading(
         history[:] = value
         memory[0] = value
     history[tick % length] = value
+    # Sensors are sampled once per tick of 1 ms.
     ticks_back = sensor.delay / 1e-3
     whole = int(ticks_back)
     fraction = ticks_back - whole
@@ -443,6 +448,7 @@ def reading(
         + sensor.crosstalk * acceleration
     )
     x += noise
+    # Noise before rounding: it dithers the converter.
     return round(x / sensor.bit) * sensor.bit if sensor.bit > 0.0 else x
 
 
@@ -503,6 +509,7 @@ def at_rest(
         np.zeros(4),
     )
     ground = ground_command * truth.ground.gain
+    # The tyre carries the preload, so the carriage stands lower by its deflection.
     x = ground - preload / truth.tyre
     settle(body.ground_z, ground, truth.ground_hydraulic)
     settle(body.structure_z, x, truth.structure_hydraulic)
@@ -624,9 +631,7 @@ def drive_actuators(
 
 
 @numba.njit(cache=True, nogil=True)
-def friction_bounds(
-    truth: Truth, motion: Array, sliding: float, rod_position: float
-) -> Bounds:
+def friction_bounds(truth: Truth, motion: Array, sliding: float, rod_position: float) -> Bounds:
     """Return the bounds of dry friction, N: the rail's up and down, the rod's up and down.
 
     sliding, rod_position: velocity, m/s, and position, m, of the plate against the carriage.
@@ -662,6 +667,7 @@ def move_carriage(
         return slide(truth, v, plate, push, bounds)
     sliding = plate - v
     viscous = truth.motor.viscous * sliding + truth.motor.drag * sliding * abs(sliding)
+    # The bristle sees the bound of the direction in which it is bent further.
     bound = rail_up if v > 0.0 else rail_down
     rail_force, motion[BRISTLE_RAIL] = bristle_force(
         truth.bristle, truth.mass, motion[BRISTLE_RAIL], v, bound

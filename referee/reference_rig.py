@@ -135,6 +135,7 @@ def simulate(
     """
     body = at_rest(truth, demands[0, 0], law.start, law.preload)
     state = LawState(0.0, 0.0, 0.0, 0.0, 0.0, law.start, 0.0)
+    # The commands before the first tick: the rig has stood still under its preload.
     held = np.array([demands[0, 0], law.start, law.preload, law.preload / 186.0])
     for tick in range(len(demands)):
         sample(truth, body, tick, noise[tick], sensors[tick])
@@ -144,6 +145,7 @@ def simulate(
             state = LawState(first, first, 0.0, load, 0.0, law.start, 0.0)
         if missed[tick] == 0.0:
             state, position, demanded, voltage = control(law, state, sensors[tick], demands[tick])
+            # A replay imposes recorded commands; the controller's own are computed and dropped.
             if len(voltages):
                 position, voltage = demands[tick, 1], voltages[tick]
             held[0], held[1], held[2], held[3] = demands[tick, 0], position, demanded, voltage
@@ -181,6 +183,7 @@ def draw_noise(truth: Truth, ticks: int, random: np.random.Generator) -> tuple[A
     for number, sensor in enumerate(
         (truth.ground_lvdt, truth.structure_lvdt, truth.suspension_lvdt, truth.load_cell)
     ):
+        # One phase per sensor, for the whole test: the mains is not synchronised with the ticks.
         mains = sensor.mains * np.sin(2 * np.pi * 50.0 * time + random.uniform(0.0, 2.0 * np.pi))
         noise[:, number] = sensor.white * random.standard_normal(ticks) + mains
     missed = (random.random(ticks) < truth.missed).astype(float)
