@@ -171,10 +171,8 @@ def step_adaptive(law: AdaptiveLaw, memory: Array, desired: float, measured: flo
     theta = memory[:order]
     history = memory[order : order + points]
     first = order + points
-    filtered_command, filtered_motion = (
-        memory[first : first + order],
-        memory[first + order : first + 2 * order],
-    )
+    filtered_command = memory[first : first + order]
+    filtered_motion = memory[first + order : first + 2 * order]
     last = memory[first + 2 * order : first + 2 * order + 2]
     sums = memory[first + 2 * order + 2 :]
     step_filter(law.filter, filtered_command, last[0])

@@ -229,14 +229,7 @@ def at_start(settings: Settings, model: Modes) -> Six:
     # Static deflection of mode i under a force F at the centre: φ_i F/ω_i².
     bent = settings.beam_sag * settings.preload * model.centre[1:] / angular**2
     heave = (settings.start - model.centre[1:] @ bent) / model.centre[0]
-    return (
-        float(heave),
-        float(bent[0]),
-        float(bent[1]),
-        float(bent[2]),
-        float(bent[3]),
-        float(bent[4]),
-    )
+    return (float(heave), *bent.tolist())
 
 
 @compilable

@@ -218,10 +218,7 @@ def _emulate(
 
 @compilable
 def update(
-    controller: Controller,
-    state: MilState,
-    measured: Measurements,
-    demand: Demand,
+    controller: Controller, state: MilState, measured: Measurements, demand: Demand
 ) -> tuple[MilState, Commands]:
     """Return the state and the commands after one tick.
 

@@ -252,17 +252,13 @@ def draw_unnamed(random: Random) -> list[DefectMaker]:
     def unnamed(kind: str, component: str, value: float, change: Change) -> DefectMaker:
         return lambda: Defect(kind, component, value, 0.0, False, change)
 
-    relaxing, wave, fading = (
-        _log_uniform(random, 0.15, 0.6),
-        _log_uniform(random, 0.25, 0.8),
-        _either_sign(random, 0.15, 0.5),
-    )
+    relaxing = _log_uniform(random, 0.15, 0.6)
+    wave = _log_uniform(random, 0.25, 0.8)
+    fading = _either_sign(random, 0.15, 0.5)
     drag, curvature = _log_uniform(random, 150.0, 1500.0), _either_sign(random, 0.03, 0.15)
-    slowdown, creep, crosstalk = (
-        _log_uniform(random, 0.04, 0.2),
-        _either_sign(random, 3e-5, 2e-4),
-        _either_sign(random, 1.0, 6.0),
-    )
+    slowdown = _log_uniform(random, 0.04, 0.2)
+    creep = _either_sign(random, 3e-5, 2e-4)
+    crosstalk = _either_sign(random, 1.0, 6.0)
     return [
         unnamed(
             "viscoelastic",

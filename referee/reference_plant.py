@@ -651,11 +651,7 @@ def friction_bounds(truth: Truth, motion: Array, sliding: float, rod_position: f
 
 @numba.njit(cache=True, nogil=True)
 def move_carriage(
-    truth: Truth,
-    motion: Array,
-    plate: float,
-    push: float,
-    bounds: Bounds,
+    truth: Truth, motion: Array, plate: float, push: float, bounds: Bounds
 ) -> tuple[float, float, float]:
     """Return the next velocity of the carriage, m/s, and the rod's viscous and dry friction, N.
 

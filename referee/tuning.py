@@ -206,9 +206,7 @@ def _posterior(toml: str) -> Posterior:
 
 
 def _run_all(
-    bench: Bench,
-    truth: Truth,
-    candidates: list[Settings],
+    bench: Bench, truth: Truth, candidates: list[Settings]
 ) -> list[list[dict[str, float]]]:
     """Run every candidate on a rig over the held-out roads; return one row per candidate."""
     base, count = bench.study.configuration, bench.study.budget.held_out

@@ -128,13 +128,7 @@ class Guide(NamedTuple):
     curve_half_range: Annotated[float, Quantity("m", 1e-9, 1e3, NONE)] = 1.0
 
 
-SHAPES = (
-    "stribeck_velocity",
-    "stribeck_exponent",
-    "cogging_pitch",
-    "cogging_phase",
-    *FRAME,
-)
+SHAPES = ("stribeck_velocity", "stribeck_exponent", "cogging_pitch", "cogging_phase", *FRAME)
 """Parameters of a guide that exert no force by themselves."""
 
 

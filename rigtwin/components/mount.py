@@ -16,14 +16,7 @@ from typing import NamedTuple
 
 from controllers.compiled import compilable
 from rigtwin.components.effect import Kind, around_nominal
-from rigtwin.components.guide import (
-    Guide,
-    curve_size,
-    damping,
-    dry_limits,
-    position_force,
-    slide,
-)
+from rigtwin.components.guide import Guide, curve_size, damping, dry_limits, position_force, slide
 from rigtwin.components.guide_step import GuideStep
 
 MOST = 60

@@ -12,11 +12,7 @@ import numpy as np
 from rigtwin.describing.clock import find_clock
 from rigtwin.describing.matching import NUMBERED
 from rigtwin.describing.reading import Reading, read_log
-from rigtwin.describing.writer import (
-    table_rows,
-    write_description,
-    write_map,
-)
+from rigtwin.describing.writer import table_rows, write_description, write_map
 from rigtwin.description.bare import model_name, name_machine
 from rigtwin.description.document import examine_text
 from rigtwin.description.machine import Machine

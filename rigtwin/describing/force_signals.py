@@ -122,10 +122,7 @@ def check_forces(
 
 
 def suggest_forces(
-    log: Log,
-    joints: Sequence[str],
-    positions: Mapping[str, Array],
-    forces: Mapping[str, LogSignal],
+    log: Log, joints: Sequence[str], positions: Mapping[str, Array], forces: Mapping[str, LogSignal]
 ) -> None:
     """Ask whether currents, or columns without a meaning, are the forces that are missing.
 

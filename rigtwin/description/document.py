@@ -170,8 +170,7 @@ class _Reader:
         if isinstance(tables, Mapping) and tables:
             return tables
         self._mistakes.note(
-            "",
-            "it has no [components.NAME]; expected at least what moves it and what is observed",
+            "", "it has no [components.NAME]; expected at least what moves it and what is observed"
         )
         return {}
 

@@ -14,12 +14,10 @@ from rigtwin.description.coupling import are_coupled
 from rigtwin.description.mechanism import Mechanism
 from rigtwin.description.mistakes import Mistakes, suggest
 
-INVERSE, POSITIONS, SERVOS, FORCES = (
-    "inverse dynamics",
-    "position commands",
-    "servos",
-    "force commands",
-)
+INVERSE = "inverse dynamics"
+POSITIONS = "position commands"
+SERVOS = "servos"
+FORCES = "force commands"
 TESTS = {
     INVERSE: "the joints move as measured, and the forces that this takes are predicted",
     POSITIONS: "each joint follows its command, nominally at once, and its position is predicted",

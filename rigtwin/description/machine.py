@@ -295,10 +295,11 @@ class Machine:
         start = self.configuration if base is None else base
         period = recording.period
         # The timestep divides the recording's period, and is at most the described one.
+        # The small number keeps a quotient of exactly n from becoming n + 1 by rounding.
         steps = max(1, math.ceil(period / start.timing.timestep - 1e-9))
         duration = max(recording.ticks * period, 0.01)
         changes: dict[str, dict[str, object]] = {
-            "timing": {"period": period, "duration": duration, "timestep": period / steps},
+            "timing": {"period": period, "duration": duration, "timestep": period / steps}
         }
         # Settings of another machine do not apply here. That the machines differ is reported by the
         # callers.
@@ -350,6 +351,7 @@ class Machine:
             if (channel := self.components[mover].channel) and channel[0] == "/command"
         }
         for effect in candidates(self.plant):
+            # With one actuator the two delays would be the same effect under two names.
             if effect.group == "computer" and len(movers) < 2:
                 continue
             if effect.name in self.excluded:
@@ -407,6 +409,7 @@ class Machine:
         if "unit of the command" in unit:
             unit = unit.replace("unit of the command", component.unit or "1")
         unit, per, _ = unit.partition(PER_CHANNEL)
+        # Parameters are declared for slides; at a hinge the same number is in angular units.
         turned = TURNING.get(unit, unit) if component.turns else unit
         return f"{turned}/{component.unit}" if per and component.unit else turned
 

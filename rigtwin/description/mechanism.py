@@ -216,10 +216,8 @@ class Mechanism:
     def force_per_command(self, name: str) -> tuple[float, float]:
         """Return a force actuator's force per command, and its limit, N or Nm (or infinite)."""
         number = self.number("actuator", name)
-        gear, gain = (
-            float(self.model.actuator_gear[number, 0]),
-            float(self.model.actuator_gainprm[number, 0]),
-        )
+        gear = float(self.model.actuator_gear[number, 0])
+        gain = float(self.model.actuator_gainprm[number, 0])
         # MuJoCo limits the force before the gear, so the limit at the joint is |gear| · forcerange.
         limit = np.inf
         if self.model.actuator_forcelimited[number]:

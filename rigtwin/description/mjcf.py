@@ -238,6 +238,7 @@ def _apply(document: Document, machine: Machine, change: Change, changes: Sequen
         return True
     if component.component_type is Mass and change.parameter == "mass":
         nominal = component_of(machine.plant, component.name, Mass).mass
+        # A body may consist of geoms without a mass of their own: all of them are scaled alike.
         return nominal > 0.0 and _scale_mass(document, component, change.value / nominal)
     if component.element == "actuator":
         return _apply_to_actuator(document, machine, component, change, changes)

@@ -31,12 +31,10 @@ class Replays:
         control: Control | None,
         mistakes: Mistakes,
     ) -> None:
-        self._mechanism, self._components, self._control, self._mistakes = (
-            mechanism,
-            components,
-            control,
-            mistakes,
-        )
+        self._mechanism = mechanism
+        self._components = components
+        self._control = control
+        self._mistakes = mistakes
 
     def read(self, tables: object) -> tuple[ReplayOf, ...]:
         """Return the replays without mistakes; note the mistakes of the rest.
@@ -184,8 +182,7 @@ class Replays:
             ]
             if len(names) > 1:
                 self._mistakes.note(
-                    where,
-                    f"joint {joint} has {len(names)} components of type {kind}; expected one",
+                    where, f"joint {joint} has {len(names)} components of type {kind}; expected one"
                 )
             parts[kind] = names[0] if names else None
         return parts

@@ -33,9 +33,7 @@ Reach = tuple[float, float]
 
 
 def excite(
-    machine: Machine,
-    reach: Callable[[Machine, tuple[str, str]], Reach | None],
-    least_period: float,
+    machine: Machine, reach: Callable[[Machine, tuple[str, str]], Reach | None], least_period: float
 ) -> Iterator[Recording]:
     """Yield recordings of multisines, without limits; none where a range is unknown.
 

@@ -79,6 +79,8 @@ class Readings:
         for name, model in self._models.items():
             value = transduce(model, self._states[name], true[name])
             if name in self._noise:
+                # Noise before rounding, as in the recording: the controller acts on what is
+                # recorded.
                 value += float(self._noise[name][tick])
             bit = self._bits[name]
             readings[name] = self.signals[name][tick] = round(value / bit) * bit if bit else value

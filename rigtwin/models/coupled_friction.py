@@ -88,6 +88,8 @@ def find_responses(contacts: GuideContacts, free: np.ndarray, h: float, work: Wo
             continue
         largest = max(largest, work.forward[g], work.backward[g])
         for a in range(loose):
+            # An impulse of h·1 N along the guide, whose response is M⁻¹·a·h by the factor of the
+            # step.
             work.column[a] = h * contacts.along[g, free[a]]
             work.unrubbed[g] += contacts.along[g, free[a]] * work.right[a]
         solve(work.system, loose, work.column)
@@ -126,6 +128,7 @@ def rub(contacts: GuideContacts, free: np.ndarray, state: State, h: float, work:
             )
             changed = max(changed, abs(friction_force - work.dry[g]))
             work.dry[g] = friction_force
+        # A single guide converges in one sweep, and ends after the second.
         if changed <= CONVERGED * largest:
             break
     for g in range(guides):

@@ -596,6 +596,7 @@ class ForwardDynamicsModel(Model[Plant]):
     def forms(self, component: str, plant: Plant) -> list[Form]:
         position, speed, force = self._passage(component, plant)
         names = [row.name for row in self.rows]
+        # A component's role decides which shapes of a disturbance are plausible there.
         signal, role = force, "guide"
         if component in names:
             signal, role = self.predict(plant)[names.index(component)], "sensor"

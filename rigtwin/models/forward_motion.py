@@ -29,13 +29,7 @@ from rigtwin.components.guide_step import GuideStep
 from rigtwin.components.mount import MountState, give_way
 from rigtwin.components.servo import Push, pull, push
 from rigtwin.models.coupled_friction import rub
-from rigtwin.models.forward_arrays import (
-    GuideContacts,
-    Servos,
-    State,
-    StepInputs,
-    WorkSpace,
-)
+from rigtwin.models.forward_arrays import GuideContacts, Servos, State, StepInputs, WorkSpace
 from rigtwin.models.joint_motion import SHORTEST
 from rigtwin.models.multibody import Bodies, find_terms
 from rigtwin.numerics.arrays import Array
@@ -185,6 +179,7 @@ def assemble(
         weight = work.implicit[g] * work.damped[g]
         for a in range(loose):
             along = contacts.along[g, free[a]]
+            # Most guides act on one coordinate.
             if along == 0.0:
                 continue
             work.right[a] += h * along * (work.guide_force[g] - weight * prescribed)
@@ -328,6 +323,7 @@ def advance(
             for i in range(size):
                 work.midspeed[i] = state.speed[i] + 0.5 * (state.speed[i] - state.before[i])
                 work.pushed[i] = work.earlier_push[i] = 0.0
+            # M(q) and c(q, q'), by MuJoCo where they change with the state.
             find_terms(bodies, state.place, work.midspeed, work.inertia, work.bias)
             push_coordinates(inputs, number, work)
             serve(inputs.servos, state, number, h, work)
@@ -336,19 +332,23 @@ def advance(
                     out[0, i, tick], out[1, i, tick] = state.place[i], state.speed[i]
                     out[2, i, tick] = work.earlier_push[i]
             for k in range(len(held)):
+                # The velocity of a prescribed coordinate is known before the step.
                 moved = inputs.prescribed[held[k], number + 1] - inputs.prescribed[held[k], number]
                 work.ahead_speed[held[k]] = moved / h
             resist_explicitly(contacts, inputs, state, tick, h, work)
             accelerate(inputs, free, held, state, tick, h, work)
             assemble(contacts, inputs.servos, free, held, h, work)
+            # The matrix is symmetric and positive definite: an inertia matrix, with damping added.
             factor(work.system, loose)
             solve(work.system, loose, work.right)
+            # `right` now holds the velocities without dry friction, which `rub` takes off.
             rub(contacts, free, state, h, work)
             for a in range(loose):
                 work.ahead_speed[free[a]] = work.right[a]
             update_guides(contacts, state, h, work)
             if step == 0:
                 for k in range(len(held)):
+                    # Inverse dynamics, once per tick, as sensors are read at ticks alone.
                     force = required_force(contacts, inputs, state, held[k], tick, h, work)
                     out[2, held[k], tick] = force
             for i in range(size):

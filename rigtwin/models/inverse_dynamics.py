@@ -117,7 +117,7 @@ class InverseDynamicsModel(Model[Plant]):
         self._read: Mapping[str, tuple[Array, float]] = (
             like._read
             if like is not None
-            else {name: self._smooth(self._measured(name)) for name in self._movers}
+            else {name: smooth(self._measured(name), self._period) for name in self._movers}
         )
         self._motions: Memo[tuple[Kinematics, Array]] = Memo(KEPT)
         self._columns: Memo[Array] = Memo(REGRESSORS)
@@ -137,9 +137,6 @@ class InverseDynamicsModel(Model[Plant]):
         channel = self._machine.components[name].channel
         assert channel is not None
         return self._signals.column(*channel)
-
-    def _smooth(self, signal: Array) -> tuple[Array, float]:
-        return smooth(signal, self._period)
 
     def thin(self, longest: float) -> InverseDynamicsModel:
         every = max(int(longest / self._period), 1)
@@ -363,7 +360,7 @@ class InverseDynamicsModel(Model[Plant]):
                     if error > 0.0:
                         level = white_noise(self._measured(name))
                         noise = level * random.standard_normal(len(signal))
-                        shifts[name] = self._smooth(signal + noise)[0] - signal
+                        shifts[name] = smooth(signal + noise, self._period)[0] - signal
                 if shifts:
                     motion = self._move(plant, shifts)
                     drawn.append((motion, self._bodies.forces(motion, self._gravity(plant))))

@@ -58,6 +58,7 @@ def simulate_prescribed(
         for name, motion in motions.items()
     }
     inputs = inputs_of_test(machine, readings, period)
+    # The model smooths these readings, as a diagnosis of the recording will.
     forces = InverseDynamicsModel(machine, replay, inputs).predict_true(plant)
     for row, force in zip(replay.rows, forces, strict=True):
         readings[row.name] = apply_sensor(sensor_of(plant, row.name), force, period)

@@ -58,6 +58,7 @@ class JointControl:
             and component.quantity in ("position", "velocity")
         }
         self.sensors = tuple(component.name for component in sensors.values())
+        # At least one entry, as of the one sensor that stands in where the controller reads none.
         self._rates = np.array([int(c.quantity == "velocity") for c in sensors.values()] or [0])
         places = list(sensors)
         self._sensor_of_input = np.array(

@@ -189,7 +189,7 @@ def step_joint(
     Parameters
     ----------
     guide_step
-        What resists the motion.
+        Guide of the joint, for the integration step.
     mass
         Inertia of the joint, kg.
     state
@@ -247,7 +247,7 @@ def integrate_pushed(
     Parameters
     ----------
     guide_step, inertia
-        What resists the motion, and inertia of the joint.
+        Guide of the joint, for the integration step, and inertia of the joint.
     start
         Initial position and velocity, m and m/s.
     drive
@@ -269,7 +269,9 @@ def integrate_pushed(
     behind = MountState(x, 0.0, slider, viscous)
     law, mass = drive.law, inertia.mass
     follows = law.position_gain > 0.0
+    # What the step before leaves: a servo's conditioned command, or a force actuator's force.
     last = drive.held.memory[3] if follows else 0.0
+    # A mount whose oscillation with the mass is faster than the step, c·m < h², counts as rigid.
     yields = guide_step.guide.mount_compliance * mass > SHORTEST * h * h
     for tick in range(len(disturbance)):
         # Sensors read before the tick's command acts.

@@ -218,8 +218,8 @@ def plate_velocity(plate: PlateMotion, tick: int, place: int, trial: bool, rate:
 
     `trial` asks for the step from a tick under the commands before it; `rate` is 1/step, 1/s.
     """
-    there = plate.onward[tick] if trial else plate.position[place + 1]
-    return (there - plate.position[place]) * rate
+    ahead = plate.onward[tick] if trial else plate.position[place + 1]
+    return (ahead - plate.position[place]) * rate
 
 
 @inlined
@@ -283,6 +283,7 @@ def solve_step(
     """
     h, force, bias, gas = carriage.timestep, forces.motor, forces.cogging, forces.gas
     plate, spring, damping = forces.structure, forces.spring, forces.damping
+    # Limits of friction as impulses over the step, Ns, as the inclusion is one of momentum.
     rail = h * forces.rail[0], h * forces.rail[1]
     motor = h * forces.rod[0], h * forces.rod[1]
     inertia = carriage.mass + h * (carriage.rail_viscous + carriage.motor_viscous)
@@ -345,10 +346,8 @@ def _mechanics(
             # Step −1 is a trial under the old commands: the sensors read the force before the
             # tick's commands act. It is not integrated.
             place = tick * steps + max(step, 0)
-            structure_now, ground_now = (
-                structure.position[place] + yielded[1],
-                ground.position[place] + yielded[0],
-            )
+            structure_now = structure.position[place] + yielded[1]
+            ground_now = ground.position[place] + yielded[0]
             ground_loss = (now.ground_unloaded - yielded[0]) * carriage.fades[0]
             structure_loss = (now.structure_unloaded - yielded[1]) * carriage.fades[1]
             plate = plate_velocity(structure, tick, place, step < 0, carriage.rate)

@@ -121,6 +121,7 @@ class SteppedTwin:
         )
         self._out = np.zeros((3, size, 2))
         self._work = allocate(size, len(free), len(contacts.springs), len(self._laws))
+        # Where nothing but commands moves the machine, no input needs to be looked up.
         movers = len(inputs.pushes) + len(inputs.servos.laws)
         self._foretold = len(held) > 0 or movers > len(self._drives)
 

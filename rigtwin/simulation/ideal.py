@@ -197,10 +197,8 @@ def _body_equations(
     a, entry = np.zeros((size, size)), np.zeros((size, 4))
     for mode in range(count):
         a[mode, count + mode] = 1.0
-        a[count + mode, mode], a[count + mode, count + mode] = (
-            -body.squares[mode],
-            -body.damping[mode],
-        )
+        a[count + mode, mode] = -body.squares[mode]
+        a[count + mode, count + mode] = -body.damping[mode]
         a[count + mode] += body.centre[mode] * force
         entry[count + mode] = body.centre[mode] * force_in
         entry[count + mode, 2] += body.weight[mode]
@@ -243,11 +241,9 @@ def _simulate(
         held[:] = inputs[tick]
         for part in range(substeps):
             if substeps > 1:
-                sprung, velocity, travel = (
-                    np.dot(rows[0], state),
-                    np.dot(rows[1], state),
-                    np.dot(rows[2], state),
-                )
+                sprung = np.dot(rows[0], state)
+                velocity = np.dot(rows[1], state)
+                travel = np.dot(rows[2], state)
                 if not on_wheel:
                     velocity, travel = velocity - held[1], travel - held[0]
                 held[3] = 0.0

@@ -330,11 +330,9 @@ def give_way(
     tuple
         Yield of the ground plate and of the structure plate, m.
     """
-    h, v, place = (
-        mechanics.timestep,
-        mechanics.qvel[mechanics.carriage],
-        mechanics.qpos[mechanics.carriage],
-    )
+    h = mechanics.timestep
+    v = mechanics.qvel[mechanics.carriage]
+    place = mechanics.qpos[mechanics.carriage]
     load, inertia, tyre = motor_force(mechanics), now.mass + h * now.rail_viscous, 0.0
     deflection = mechanics.qpos[mechanics.ground] - place
     share = share_of_load(now.ground_compliance, now.ground_lag, h)

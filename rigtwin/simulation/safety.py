@@ -261,10 +261,8 @@ def stop_state(limits: Safety, commands: Commands) -> Commands:
 def is_beyond(limits: Safety, measured: Measurements) -> bool:
     """Return whether a cylinder is beyond its limit, or its position is unknown."""
     # Compared this way round, a NaN counts as beyond.
-    ground, structure = (
-        abs(measured.ground_lvdt) <= limits.ground,
-        abs(measured.structure_lvdt) <= limits.structure,
-    )
+    ground = abs(measured.ground_lvdt) <= limits.ground
+    structure = abs(measured.structure_lvdt) <= limits.structure
     return not (ground and structure and abs(measured.suspension_lvdt) <= limits.travel)
 
 
