@@ -129,10 +129,13 @@ def _law(coefficients: list[float], period: float, corner: float, span: float) -
     """Return the parts that both estimators share."""
     order = len(coefficients)
     motion_filter = state_filter(order, corner, period)
+    # In s^order the coefficients differ by decades; scaled by the corner they are of one size, and
+    # one gain suits all.
     units = motion_filter.corner ** np.arange(order, dtype=np.float64)
     start = np.asarray(coefficients, dtype=np.float64) * units
     # Bounds keep a wrong estimate from making the loop unstable.
     reach = span * np.abs(start)
+    # Accuracy is the number of points less the power: second order for the highest one.
     points = order + 1
     stencils = np.array([derivative_weights(power, points, period) for power in range(order)])
     return AdaptiveLaw(
@@ -168,10 +171,8 @@ def step_adaptive(law: AdaptiveLaw, memory: Array, desired: float, measured: flo
     theta = memory[:order]
     history = memory[order : order + points]
     first = order + points
-    filtered_command, filtered_motion = (
-        memory[first : first + order],
-        memory[first + order : first + 2 * order],
-    )
+    filtered_command = memory[first : first + order]
+    filtered_motion = memory[first + order : first + 2 * order]
     last = memory[first + 2 * order : first + 2 * order + 2]
     sums = memory[first + 2 * order + 2 :]
     step_filter(law.filter, filtered_command, last[0])
@@ -182,6 +183,7 @@ def step_adaptive(law: AdaptiveLaw, memory: Array, desired: float, measured: flo
         _fit(law, theta, sums, filtered_motion, filtered_command[0])
     else:
         _descend(law, theta, filtered_motion, filtered_command[0])
+    # Shifted by hand: an overlapping slice assignment would copy in compiled code.
     for index in range(points - 1, 0, -1):
         history[index] = history[index - 1]
     history[0] = desired
@@ -201,6 +203,7 @@ def _descend(
     law: AdaptiveLaw, theta: Array, filtered_motion: Array, filtered_command: float
 ) -> None:
     """Update the coefficients in place by one gradient step."""
+    # Normalised by ν² + φᵀφ, so that the step does not depend on the size of the motion.
     error, size = filtered_command, law.size**2
     for power in range(len(theta)):
         error -= theta[power] * filtered_motion[power]
@@ -228,6 +231,7 @@ def _fit(
         cross[row] = law.fading * cross[row] + filtered_motion[row] * filtered_command
         system[row, row] += law.hold
         right_side[row] = cross[row] + law.hold * law.start[row]
+    # Clipped one by one below: the bounded optimum is not needed, as the bounds are a safeguard.
     solution = np.linalg.solve(system, right_side)
     for row in range(order):
         theta[row] = min(max(solution[row], law.low[row]), law.high[row])

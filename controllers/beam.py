@@ -75,6 +75,8 @@ def element(settings: Settings) -> tuple[Array, Array]:
     # Equal second moments: J = 2 I. G = E / (2 (1 + ν)) = E / 2.6.
     polar, shear = 2.0 * inertia, modulus / 2.6
     mass, stiffness = np.zeros((12, 12)), np.zeros((12, 12))
+    # Consistent matrices of a rod with linear shape functions: m·L/6·[2 1; 1 2] and EA/L·[1 −1; −1
+    # 1].
     rod = np.array([[2.0, 1.0], [1.0, 2.0]]) * length / 6.0
     spring = np.array([[1.0, -1.0], [-1.0, 1.0]]) / length
     # Axial displacement and torsion share the linear shape functions of a rod.
@@ -90,6 +92,8 @@ def element(settings: Settings) -> tuple[Array, Array]:
         scale = np.outer(signs, signs)
         a = length
         block = np.ix_(freedoms, freedoms)
+        # Hermite's cubic shape functions of a Bernoulli beam, in the order deflection, slope,
+        # deflection, slope (thesis Eq. 7.2, 7.3).
         mass[block] = (
             scale
             * (line * a / 420.0)
@@ -133,11 +137,13 @@ def assembled(settings: Settings) -> tuple[Array, Array]:
                 [0.0, 0.0, 1.0],
             ]
         )
+        # Displacements and rotations of both nodes turn alike: four blocks of 3 × 3.
         whole = np.kron(np.eye(4), rotation)
         nodes = [0, *range(1 + BEAMS * arm, 1 + BEAMS * (arm + 1))]
         for inner, outer in pairwise(nodes):
             indices = [6 * node + freedom for node in (inner, outer) for freedom in range(6)]
             for total, single in zip((mass, stiffness), beam_matrices, strict=True):
+                # Energies add up: Tᵀ·K·T of every beam, at the freedoms of its two nodes.
                 total[np.ix_(indices, indices)] += whole.T @ single @ whole
     return mass, stiffness
 
@@ -157,7 +163,7 @@ def all_modes(settings: Settings) -> tuple[Array, Array]:
 def modes(settings: Settings, period: float) -> Modes:
     """Return the symmetric modes, sampled exactly for a force held over a period, s."""
     beam_settings = {
-        name: getattr(settings, name) for name in Settings._fields if name.startswith("beam_")
+        name: value for name, value in settings._asdict().items() if name.startswith("beam_")
     }
     # A diagnosis makes hundreds of controllers with equal beams: the cache key keeps only what
     # the modes depend on.
@@ -186,6 +192,7 @@ def _modes(settings: Settings, period: float) -> Modes:
         transition,
         entry,
         np.ascontiguousarray(shapes[HEAVE]),
+        # Gravity acts on every mass: its modal force is −g·1ᵀ·M·φ.
         np.ascontiguousarray(-settings.gravity * upward @ mass @ shapes),
         np.ascontiguousarray(shapes[along].T),
         angular / (2 * math.pi),
@@ -204,6 +211,7 @@ def _symmetric(settings: Settings) -> tuple[Array, Array]:
         for number in range(BEAMS):
             node = 6 * (1 + BEAMS * arm + number)
             base[node + HEAVE, 1 + 2 * number] = 1.0
+            # The slope of an arm is a rotation about the horizontal axis across it.
             base[node + 3, 2 + 2 * number] = -math.sin(angle)
             base[node + 4, 2 + 2 * number] = math.cos(angle)
     squares, shapes = eigh(base.T @ stiffness @ base, base.T @ mass @ base)
@@ -221,14 +229,7 @@ def at_start(settings: Settings, model: Modes) -> Six:
     # Static deflection of mode i under a force F at the centre: φ_i F/ω_i².
     bent = settings.beam_sag * settings.preload * model.centre[1:] / angular**2
     heave = (settings.start - model.centre[1:] @ bent) / model.centre[0]
-    return (
-        float(heave),
-        float(bent[0]),
-        float(bent[1]),
-        float(bent[2]),
-        float(bent[3]),
-        float(bent[4]),
-    )
+    return (float(heave), *bent.tolist())
 
 
 @compilable

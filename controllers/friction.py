@@ -89,6 +89,7 @@ def _crossing(velocity: float, acceleration: float, horizon: float) -> float:
 
     The crossing is extrapolated with constant acceleration: t = −v/a.
     """
+    # The velocity crosses zero only if the acceleration is against it.
     if velocity * acceleration >= 0.0:
         return 0.0
     return -_sign(velocity) if -velocity / acceleration < horizon else 0.0
@@ -139,12 +140,14 @@ def _spike(settings: Settings, window: float, errors: Errors, period: float) -> 
     direction = _sign(errors[0])
     if abs(errors[0]) < settings.spike_threshold:
         return 0.0
+    # This one needs neither the window nor the history of the error.
     if kind == Compensator.FORCE_THRESHOLD:
         return direction
     if not error_has_risen(settings, errors, direction, period):
         return 0.0
     if kind == Compensator.FORCE_PROFILE:
         return direction
+    # With a window, the spike has to point the way in which the motion is about to reverse.
     return direction if direction == window else 0.0
 
 
@@ -184,6 +187,7 @@ def step_compensator(
     elif open_for <= 0.0:
         window = 0.0
     wait, pending = state.wait - period, state.pending
+    # What stays once the second step is made: half a friction jump to either side.
     level = state.added - pending
     if pending * error < abs(pending) * settings.spike_threshold:
         # The error is below the threshold again: make the second step.
@@ -221,6 +225,7 @@ def observe_friction(
     if settings.observer_notch > 0.0:
         # Notch (z² − 2 cos ω T z + 1)/(z² − 2 r cos ω T z + r²), scaled to gain 1 at rest.
         cosine = 2.0 * math.cos(2.0 * math.pi * MAINS * period)
+        # Pole radius of a notch whose −3 dB width is `observer_notch`, Hz, if it is narrow.
         radius = 1.0 - math.pi * settings.observer_notch * period
         scale = (1.0 - radius * cosine + radius**2) / (2.0 - cosine)
         notched = scale * (residual - cosine * state.notch_in + state.notch_before)
@@ -240,5 +245,6 @@ def observe_friction(
 def advance_motor_model(state: Compensation, force: float, period: float) -> Compensation:
     """Return the memory with the motor's model advanced by a tick; force: commanded, N."""
     decay = math.exp(-period / MOTOR_LAG)
+    # Exact for a force held over the tick: the amplifier's command is.
     motor = decay * state.motor + (1.0 - decay) * force
     return Compensation(*(state[:MOTOR] + (motor,) + state[BEHIND_MOTOR:]))  # noqa: RUF005

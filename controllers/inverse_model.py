@@ -21,10 +21,7 @@ from controllers.linear_law import LinearLaw, add_feedback, filtered
 
 
 def inverse_model(
-    coefficients: Sequence[float],
-    period: float,
-    proportional: float = 0.0,
-    integral: float = 0.0,
+    coefficients: Sequence[float], period: float, proportional: float = 0.0, integral: float = 0.0
 ) -> LinearLaw:
     """Return the law of an inverse with feedback.
 

@@ -19,11 +19,9 @@ def lag_compensation(lag: float, period: float, limit: float = 20.0) -> LinearLa
     # Bilinear: s → 2/T (z − 1)/(z + 1) in (τ s + 1)/(τ s/N + 1).
     rate = 2.0 / period
     lead, filter_ = lag * rate, lag / limit * rate
-    ahead, behind, pole = (
-        (lead + 1.0) / (filter_ + 1.0),
-        (1.0 - lead) / (filter_ + 1.0),
-        (filter_ - 1.0) / (filter_ + 1.0),
-    )
+    ahead = (lead + 1.0) / (filter_ + 1.0)
+    behind = (1.0 - lead) / (filter_ + 1.0)
+    pole = (filter_ - 1.0) / (filter_ + 1.0)
     return LinearLaw(
         np.array([[pole]]),
         np.array([[1.0, 0.0]]),

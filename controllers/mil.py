@@ -154,12 +154,71 @@ def _filter_measurements(
     return sample, travel, velocity, force
 
 
+class Emulated(NamedTuple):
+    """What the models of suspension and structure demand at one tick."""
+
+    force: float
+    """Force of the suspension, N."""
+    position: float
+    velocity: float
+    """Motion of the structure, m and m/s."""
+    modal: Six
+    modal_rates: Six
+    """Displacements of the structure's modes, and their rates."""
+    plate: Array
+    """Memory of the plate's compensator."""
+    plate_command: float
+    """Command of the plate, m."""
+
+
 @compilable
-def update(
+def _emulate(
     controller: Controller,
     state: MilState,
     measured: Measurements,
     demand: Demand,
+    filtered: tuple[float, float, float],
+) -> Emulated:
+    """Advance the models of suspension and structure by one tick.
+
+    `filtered` is the filtered travel, m, velocity, m/s, and force, N.
+    """
+    settings, (travel, velocity, force) = controller.settings, filtered
+    modal, modal_rates = state.modal, state.modal_rates
+    # Imposed tests bypass the models, and with them the delay compensation.
+    if settings.mode == Mode.IMPOSED:
+        position = demand.structure
+        return Emulated(demand.force, position, 0.0, modal, modal_rates, state.plate, position)
+    # The structure's velocity is that of the tick before: this tick's needs the force first.
+    skyhook = skyhook_force(settings, state.structure_velocity, velocity)
+    demanded = suspension_force(settings, travel, velocity) - skyhook
+    body_force = force
+    if settings.gas_force > 0.0:
+        # The load cell is on the motor's rod. The force of the real gas spring beside it follows
+        # from the travel.
+        length, exponent = settings.gas_length, settings.gas_exponent
+        body_force += gas_force(settings.gas_force, length, exponent, -travel)
+    if settings.structure == Structure.BEAM:
+        modal, modal_rates = beam(controller.modes, modal, modal_rates, body_force)
+        position = centre(controller.modes, modal)
+        rate = centre(controller.modes, modal_rates)
+    else:
+        position, rate = point_mass(
+            settings,
+            state.structure_position,
+            state.structure_velocity,
+            body_force,
+            controller.period,
+        )
+    memory, plate_command = compensate(
+        controller.plate, state.plate, position, measured.structure_lvdt
+    )
+    return Emulated(demanded, position, rate, modal, modal_rates, memory, plate_command)
+
+
+@compilable
+def update(
+    controller: Controller, state: MilState, measured: Measurements, demand: Demand
 ) -> tuple[MilState, Commands]:
     """Return the state and the commands after one tick.
 
@@ -168,34 +227,7 @@ def update(
     """
     settings, period = controller.settings, controller.period
     sample, travel, velocity, force = _filter_measurements(controller, state, measured, demand)
-    modal, modal_rates = state.modal, state.modal_rates
-    memory = state.plate
-    # Imposed tests bypass the models, and with them the delay compensation.
-    if settings.mode == Mode.IMPOSED:
-        demanded = demand.force
-        position, structure_velocity = demand.structure, 0.0
-        plate_command = position
-    else:
-        # The structure's velocity is that of the tick before: this tick's needs the force first.
-        skyhook = skyhook_force(settings, state.structure_velocity, velocity)
-        demanded = suspension_force(settings, travel, velocity) - skyhook
-        body_force = force
-        if settings.gas_force > 0.0:
-            # The load cell is on the motor's rod. The force of the real gas spring beside it
-            # follows from the travel.
-            length, exponent = settings.gas_length, settings.gas_exponent
-            body_force += gas_force(settings.gas_force, length, exponent, -travel)
-        if settings.structure == Structure.BEAM:
-            modal, modal_rates = beam(controller.modes, modal, modal_rates, body_force)
-            position = centre(controller.modes, modal)
-            structure_velocity = centre(controller.modes, modal_rates)
-        else:
-            position, structure_velocity = point_mass(
-                settings, state.structure_position, state.structure_velocity, body_force, period
-            )
-        memory, plate_command = compensate(
-            controller.plate, memory, position, measured.structure_lvdt
-        )
+    models = _emulate(controller, state, measured, demand, (travel, velocity, force))
     compensation, velocities, errors = state.compensation, state.velocities, state.errors
     if settings.compensator == Compensator.OBSERVER:
         compensation = observe_friction(settings, compensation, measured.load_cell, period)
@@ -207,11 +239,11 @@ def update(
             velocities,
             errors,
             travel=measured.suspension_lvdt,
-            error=demanded - force,
+            error=models.force - force,
             period=period,
         )
     added = compensation.added
-    integral, voltage = force_loop(settings, state.integral, demanded, force, added, period)
+    integral, voltage = force_loop(settings, state.integral, models.force, force, added, period)
     compensation = advance_motor_model(compensation, MOTOR_CONSTANT * voltage, period)
     next_state = MilState(
         sample=sample,
@@ -219,13 +251,13 @@ def update(
         velocity=velocity,
         force=force,
         integral=integral,
-        structure_position=position,
-        structure_velocity=structure_velocity,
-        modal=modal,
-        modal_rates=modal_rates,
+        structure_position=models.position,
+        structure_velocity=models.velocity,
+        modal=models.modal,
+        modal_rates=models.modal_rates,
         compensation=compensation,
         velocities=velocities,
         errors=errors,
-        plate=memory,
+        plate=models.plate,
     )
-    return next_state, Commands(demand.ground, plate_command, demanded, voltage)
+    return next_state, Commands(demand.ground, models.plate_command, models.force, voltage)

@@ -53,7 +53,8 @@ class Plate(NamedTuple):
 
 def cylinder_model(settings: Settings) -> ClosedLoop:
     """Return the model of the structure cylinder in the settings."""
-    return ClosedLoop(*(getattr(settings, f"plate_{name}") for name in ClosedLoop._fields))
+    values = settings._asdict()
+    return ClosedLoop(*(values[f"plate_{name}"] for name in ClosedLoop._fields))
 
 
 def plate(settings: Settings, period: float) -> Plate:

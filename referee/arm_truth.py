@@ -146,6 +146,7 @@ def link_forces(
             angular_acceleration[number] * tangential[:, number]
             - rate[number] ** 2 * radial[:, number]
         )
+        # Acceleration of the next joint: tangential α·L and centripetal −ω²·L.
         joints.append(joints[-1] + link.length * along_motion)
     torques = np.empty_like(angle)
     force, torque = np.zeros_like(point_acceleration), np.zeros(angle.shape[1])
@@ -158,9 +159,12 @@ def link_forces(
         inertial = link.mass * (
             joints[number] + link.along * along_motion + link.across * across_motion
         )
+        # Euler about the joint: the link's own, that of its mass at the lever, and that of the
+        # outer links.
         torque = torque + link.inertia * angular_acceleration[number]
         torque = torque + _cross(centre, inertial) + _cross(link.length * u, force)
         force = force + inertial
+        # A planar joint transmits the sum of all moments further out.
         torques[number] = torque
     return torques, force
 
@@ -178,6 +182,7 @@ def resisting_force(
     dry = resistance.slip + (resistance.breakaway - resistance.slip) * np.exp(
         -((speed / resistance.fade_speed) ** 2)
     )
+    # sign(0) = 0: at a standstill the friction of a prescribed motion is not determined.
     force = dry * np.sign(speed) + resistance.viscous * speed + resistance.constant
     return force + resistance.spring * position + resistance.rotor * acceleration
 
@@ -203,10 +208,12 @@ def motor_forces(arm: Arm, travel: JointTravel) -> Array:
         hinges = JointTravel(*(each[1:] for each in travel))
     forces, reaction = link_forces(arm.links, point_acceleration, hinges)
     if arm.cart is not None:
+        # The cart feels the horizontal force of the links and its own inertia.
         forces = np.concatenate([[reaction[0] + arm.cart * point_acceleration[0]], forces])
     for number, resistance in enumerate(arm.resistances):
         forces[number] = forces[number] + resisting_force(
             resistance, *(each[number] for each in travel)
         )
+    # A belt over both joints turns with the sum of their angles, so each joint feels its force.
     forces[-2:] += resisting_force(arm.belt, *(each[-2:].sum(axis=0) for each in travel))
     return forces

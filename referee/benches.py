@@ -119,9 +119,11 @@ def _integrate(
     levels = np.full(len(lags), demand[0])
     position, speed, out, limited = demand[0], 0.0, np.empty(len(demand)), demand[0]
     after_play = demand[0]
+    # The trapezoidal rule needs the input of the step before, for every lag.
     previous = np.full(len(lags) + 1, demand[0])
     for n in range(len(demand)):
         after_play = min(max(after_play, demand[n] - half_play), demand[n] + half_play)
+        # The speed limit acts before the lags, as that of a controller's ramp does.
         limited += min(max(after_play - limited, -speed_limit * step), speed_limit * step)
         value = limited
         for k in range(len(lags)):
@@ -169,6 +171,7 @@ def damper_force(truth: DamperTruth, motion: Array, speed: Array) -> Array:
     ) * speed + truth.quadratic * speed * np.abs(speed)
     # A rigid connection is a very stiff spring, so both use the same operator.
     spring = min(truth.spring, 1e9)
+    # The stop operator lets the slider follow beyond this stretch.
     largest_stretch = truth.slip / spring + 0.5 * truth.play
     stretch, dry = 0.0, np.empty(len(motion))
     previous = motion[0]

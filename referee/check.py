@@ -88,27 +88,14 @@ def check(
     recordings = folder / f"seed-{seed}"
     # The seed is part of the path: two checks never mix their recordings.
     recordings.mkdir(parents=True, exist_ok=True)
-    command = [sys.executable, "-m", "referee.referee", str(recordings), str(cases), str(seed)]
-    # Block SIGINT while the referee starts: Ctrl-C would end it in its imports.
-    with block_sigint():
-        started = subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-        )
-    with started as referee:
+    with _start_referee(recordings, cases, seed) as referee:
         assert referee.stdin is not None
         assert referee.stdout is not None
-        commitment = ""
         try:
-            for line in referee.stdout:
-                word, _, value = line.partition(" ")
-                if word == "case":
-                    progress(1)
-                elif word == "commitment":
-                    commitment = value.strip()
-                    break
-            if not commitment:
-                raise RigtwinError("the referee ended before it published a commitment to its key")
+            commitment = _await_commitment(referee.stdout, progress)
             (recordings / "commitment.txt").write_text(commitment + "\n")
+            # From here on the key is fixed: the referee only records further tests, and opens it at
+            # the end.
             answers = _diagnose_all(recordings, cases, workers, progress)
             settled = _run_next_tests(recordings, answers, referee.stdin, referee.stdout, workers)
             crude = _crude(recordings, cases, workers) if baselines else {}
@@ -117,6 +104,7 @@ def check(
             raise
         referee.stdin.write("open\n")
         referee.stdin.flush()
+        # The salt keeps the key from being guessed from its hash: a key has few possible values.
         salt = referee.stdout.readline().partition(" ")[2].strip()
         opened = referee.stdout.readline().strip()
     # The key was fixed before the first answer only if its hash matches.
@@ -124,6 +112,25 @@ def check(
         raise RigtwinError("the referee's key does not match its commitment")
     (recordings / "key.json").write_text(opened + "\n")
     return Result(seed, commitment, json.loads(opened), answers, crude, settled)
+
+
+def _start_referee(recordings: Path, cases: int, seed: int) -> subprocess.Popen[str]:
+    """Start the referee, which records its cases in a folder."""
+    command = [sys.executable, "-m", "referee.referee", str(recordings), str(cases), str(seed)]
+    # Block SIGINT while the referee starts: Ctrl-C would end it in its imports.
+    with block_sigint():
+        return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+
+
+def _await_commitment(lines: IO[str], progress: Callable[[int], object]) -> str:
+    """Return the referee's commitment to its key, which follows its last recording."""
+    for line in lines:
+        word, _, value = line.partition(" ")
+        if word == "case":
+            progress(1)
+        elif word == "commitment" and value.strip():
+            return value.strip()
+    raise RigtwinError("the referee ended before it published a commitment to its key")
 
 
 def _diagnose_all(
@@ -136,6 +143,8 @@ def _diagnose_all(
             files = [path.read_bytes() for path in _paths(recordings, number)]
             yield keys[number], files
 
+    # Answers are stored by the contents that they are based on, so an equal recording is not
+    # diagnosed twice.
     keys = [_key(recordings, number) for number in range(cases)]
     with Store(recordings / "answers.sqlite") as store:
         run_jobs(store, workers, answer, jobs(), progress)

@@ -43,19 +43,24 @@ class Defect:
     change: Change = field(repr=False)
 
 
+DefectMaker = Callable[[], Defect]
+
+
 def _replace_fields(path: str, **values: float) -> Change:
     """Return a change of fields of the rig, or of its part `path`."""
 
     def change(truth: Truth, law: Law) -> tuple[Truth, Law]:
         if not path:
             return truth._replace(**values), law
-        return truth._replace(**{path: getattr(truth, path)._replace(**values)}), law
+        part = truth._asdict()[path]
+        return truth._replace(**{path: part._replace(**values)}), law
 
     return change
 
 
 def _log_uniform(random: Random, low: float, high: float) -> float:
     """Draw a number between two bounds, uniform in its logarithm."""
+    # Sizes span decades: a uniform draw would hardly ever give a small one.
     return float(np.exp(random.uniform(np.log(low), np.log(high))))
 
 
@@ -64,29 +69,38 @@ def _either_sign(random: Random, low: float, high: float) -> float:
     return _log_uniform(random, low, high) * float(random.choice([-1.0, 1.0]))
 
 
-def friction(component: str, random: Random) -> list[Callable[[], Defect]]:
+def _single(
+    kind: str, component: str, nominal: float, path: str, name: str, draw: Callable[[], float]
+) -> DefectMaker:
+    """Return a function that draws a defect of one number.
+
+    Parameters
+    ----------
+    kind, component, nominal
+        Kind, component and nominal value, as in `Defect`.
+    path, name
+        Part of the rig, empty for the rig itself, and its field that takes the value.
+    draw
+        Function that draws the value.
+    """
+
+    def defect() -> Defect:
+        value = draw()
+        change = _replace_fields(path, **{name: value})
+        return Defect(kind, component, value, nominal, True, change)
+
+    return defect
+
+
+def friction(component: str, random: Random) -> list[DefectMaker]:
     """Return functions that draw the friction defects of `rail` or `motor`."""
     # The motor has less friction and less force than the rail: its defects are scaled down.
     nominal, scale = (50.0, 1.0) if component == "rail" else (14.0, 0.3)
 
-    def coulomb() -> Defect:
-        value = nominal * (
-            1.0
-            + (
-                _log_uniform(random, 0.15, 1.5)
-                if random.random() < 0.7
-                else -_log_uniform(random, 0.2, 0.7)
-            )
-        )
-        return Defect(
-            "coulomb", component, value, nominal, True, _replace_fields(component, coulomb=value)
-        )
-
-    def viscous() -> Defect:
-        value = scale * _log_uniform(random, 30.0, 500.0)
-        return Defect(
-            "viscous", component, value, 0.0, True, _replace_fields(component, viscous=value)
-        )
+    def coulomb() -> float:
+        if random.random() < 0.7:
+            return nominal * (1.0 + _log_uniform(random, 0.15, 1.5))
+        return nominal * (1.0 - _log_uniform(random, 0.2, 0.7))
 
     def stribeck() -> Defect:
         value, speed = scale * _log_uniform(random, 10.0, 60.0), _log_uniform(random, 0.004, 0.05)
@@ -95,226 +109,156 @@ def friction(component: str, random: Random) -> list[Callable[[], Defect]]:
         change = _replace_fields(component, peak=value, peak_speed=speed, peak_shape=shape)
         return Defect("stribeck", component, value, 0.0, True, change)
 
-    def asymmetry() -> Defect:
-        value = scale * _either_sign(random, 8.0, 50.0)
-        return Defect(
-            "asymmetry", component, value, 0.0, True, _replace_fields(component, asymmetry=value)
-        )
+    def single(kind: str, name: str, draw: Callable[[], float], at: float = 0.0) -> DefectMaker:
+        return _single(kind, component, at, component, name, draw)
 
-    def backlash() -> Defect:
-        value = _log_uniform(random, 3e-4, 5e-3)
-        return Defect(
-            "backlash", component, value, 0.0, True, _replace_fields(component, play=value)
-        )
-
-    return [coulomb, viscous, stribeck, asymmetry, backlash]
+    return [
+        single("coulomb", "coulomb", coulomb, nominal),
+        single("viscous", "viscous", lambda: scale * _log_uniform(random, 30.0, 500.0)),
+        stribeck,
+        single("asymmetry", "asymmetry", lambda: scale * _either_sign(random, 8.0, 50.0)),
+        single("backlash", "play", lambda: _log_uniform(random, 3e-4, 5e-3)),
+    ]
 
 
 def _actuator(
     component: str, path: str, largest: float, fastest: float, random: Random
-) -> list[Callable[[], Defect]]:
+) -> list[DefectMaker]:
     """Return functions that draw the defects of an actuator.
 
     largest, fastest: largest command and command rate of the test without defects, in the
-    command's unit. Limits are drawn below them, so they act.
+    command's unit. Limits are drawn below them: a limit that never acts would be invisible.
     """
-    motor = component == "motor"
+    motor, hydraulic = component == "motor", f"{path}_hydraulic"
 
-    def gain() -> Defect:
-        value = 1.0 + _either_sign(random, 0.02, 0.15)
-        return Defect("gain", component, value, 1.0, True, _replace_fields(path, gain=value))
+    def single(
+        kind: str, name: str, draw: Callable[[], float], nominal: float = 0.0, part: str = path
+    ) -> DefectMaker:
+        return _single(kind, component, nominal, part, name, draw)
 
-    def lag() -> Defect:
-        value = _log_uniform(random, 1e-3, 1.2e-2)
-        return Defect("lag", component, value, 0.0, True, _replace_fields(path, lag=value))
-
-    def delay() -> Defect:
-        value = _log_uniform(random, 1e-3, 1.2e-2)
-        return Defect("delay", component, value, 0.0, True, _replace_fields(path, delay=value))
-
-    def saturation() -> Defect:
-        # A limit above the largest command would be invisible.
-        value = largest * random.uniform(0.5, 0.85)
-        return Defect(
-            "saturation", component, value, np.inf, True, _replace_fields(path, limit=value)
-        )
-
-    def deadband() -> Defect:
-        value = _log_uniform(random, 0.03, 0.3) if motor else _log_uniform(random, 3e-4, 3e-3)
-        return Defect(
-            "deadband", component, value, 0.0, True, _replace_fields(path, dead_zone=value)
-        )
-
-    def rate_limit() -> Defect:
-        if motor:
-            value = fastest * random.uniform(0.05, 0.5)
-            return Defect(
-                "rate_limit", component, value, np.inf, True, _replace_fields(path, rate=value)
-            )
-        value = min(fastest, 0.3) * random.uniform(0.2, 0.7)
-        return Defect(
+    band = (0.03, 0.3) if motor else (3e-4, 3e-3)
+    defects = [
+        single("gain", "gain", lambda: 1.0 + _either_sign(random, 0.02, 0.15), 1.0),
+        single("lag", "lag", lambda: _log_uniform(random, 1e-3, 1.2e-2)),
+        single("delay", "delay", lambda: _log_uniform(random, 1e-3, 1.2e-2)),
+        single("saturation", "limit", lambda: largest * random.uniform(0.5, 0.85), np.inf),
+        single("deadband", "dead_zone", lambda: _log_uniform(random, *band)),
+    ]
+    if motor:
+        rate = single("rate_limit", "rate", lambda: fastest * random.uniform(0.05, 0.5), np.inf)
+        return [*defects, rate, lambda: _cogging(component, random)]
+    return [
+        *defects,
+        single(
             "rate_limit",
-            component,
-            value,
+            "speed",
+            lambda: min(fastest, 0.3) * random.uniform(0.2, 0.7),
             0.3,
-            True,
-            _replace_fields(f"{path}_hydraulic", speed=value),
-        )
-
-    def compliance() -> Defect:
-        value = _log_uniform(random, 2e-7, 3e-6)
-        immediate = random.random() < 0.5
-        hydraulic = _replace_fields(f"{path}_hydraulic", compliance=value)
-
-        def change(truth: Truth, law: Law) -> tuple[Truth, Law]:
-            # A stiff bristle between the carriage and a compliant plate would need much smaller
-            # steps, so this rig has set-valued friction.
-            load_lag = 0.0 if immediate else truth.load_lag
-            return hydraulic(truth._replace(bristle=0.0, load_lag=load_lag), law)
-
-        return Defect("compliance", component, value, 0.0, True, change)
-
-    def play() -> Defect:
-        value = _log_uniform(random, 6e-4, 6e-3)
-        return Defect(
-            "backlash",
-            component,
-            value,
-            0.0,
-            True,
-            _replace_fields(f"{path}_hydraulic", play=value),
-        )
-
-    def cogging() -> Defect:
-        value = _log_uniform(random, 2.0, 15.0)
-        change = _replace_fields(
-            "",
-            ripple=value,
-            ripple_pitch=_log_uniform(random, 0.012, 0.05),
-            ripple_phase=random.uniform(-3.0, 3.0),
-        )
-        return Defect("cogging", component, value, 0.0, True, change)
-
-    specific = [cogging] if motor else [compliance, play]
-    return [gain, lag, delay, saturation, deadband, rate_limit, *specific]
+            hydraulic,
+        ),
+        lambda: _compliance(component, hydraulic, random),
+        single("backlash", "play", lambda: _log_uniform(random, 6e-4, 6e-3), 0.0, hydraulic),
+    ]
 
 
-def _sensor(component: str, random: Random) -> list[Callable[[], Defect]]:
+def _cogging(component: str, random: Random) -> Defect:
+    value = _log_uniform(random, 2.0, 15.0)
+    change = _replace_fields(
+        "",
+        ripple=value,
+        ripple_pitch=_log_uniform(random, 0.012, 0.05),
+        ripple_phase=random.uniform(-3.0, 3.0),
+    )
+    return Defect("cogging", component, value, 0.0, True, change)
+
+
+def _compliance(component: str, hydraulic: str, random: Random) -> Defect:
+    value = _log_uniform(random, 2e-7, 3e-6)
+    immediate = random.random() < 0.5
+    yielding = _replace_fields(hydraulic, compliance=value)
+
+    def change(truth: Truth, law: Law) -> tuple[Truth, Law]:
+        # A stiff bristle between the carriage and a compliant plate would need much smaller steps,
+        # so this rig has set-valued friction.
+        load_lag = 0.0 if immediate else truth.load_lag
+        return yielding(truth._replace(bristle=0.0, load_lag=load_lag), law)
+
+    return Defect("compliance", component, value, 0.0, True, change)
+
+
+def _sensor(component: str, random: Random) -> list[DefectMaker]:
     """Return functions that draw the defects of a sensor."""
     cell = component == "load_cell"
     nominal = CELL if cell else LVDT
 
-    def gain() -> Defect:
-        value = 1.0 + _either_sign(random, 0.015, 0.1)
-        return Defect("gain", component, value, 1.0, True, _replace_fields(component, gain=value))
+    def single(kind: str, name: str, draw: Callable[[], float], at: float = 0.0) -> DefectMaker:
+        return _single(kind, component, at, component, name, draw)
 
-    def offset() -> Defect:
-        value = _either_sign(random, 2.0, 20.0) if cell else _either_sign(random, 2e-4, 3e-3)
-        return Defect(
-            "offset", component, value, 0.0, True, _replace_fields(component, offset=value)
-        )
-
-    def drift() -> Defect:
-        value = _either_sign(random, 0.3, 3.0) if cell else _either_sign(random, 3e-5, 3e-4)
-        return Defect("drift", component, value, 0.0, True, _replace_fields(component, drift=value))
-
-    def lag() -> Defect:
-        value = _log_uniform(random, 1e-3, 1e-2)
-        return Defect("lag", component, value, 0.0, True, _replace_fields(component, lag=value))
-
-    def delay() -> Defect:
-        value = _log_uniform(random, 1e-3, 1e-2)
-        return Defect("delay", component, value, 0.0, True, _replace_fields(component, delay=value))
-
-    def hum() -> Defect:
-        value = nominal.mains * _log_uniform(random, 4.0, 10.0)
-        return Defect(
-            "hum", component, value, nominal.mains, True, _replace_fields(component, mains=value)
-        )
-
-    def noise() -> Defect:
-        value = nominal.white * _log_uniform(random, 4.0, 10.0)
-        return Defect(
-            "noise", component, value, nominal.white, True, _replace_fields(component, white=value)
-        )
-
-    def quantisation() -> Defect:
-        value = nominal.bit * _log_uniform(random, 60.0, 400.0)
-        return Defect(
-            "quantisation",
-            component,
-            value,
-            nominal.bit,
-            True,
-            _replace_fields(component, bit=value),
-        )
-
-    return [gain, offset, drift, lag, delay, hum, noise, quantisation]
+    offset, drift = ((2.0, 20.0), (0.3, 3.0)) if cell else ((2e-4, 3e-3), (3e-5, 3e-4))
+    white, bit = nominal.white, nominal.bit
+    return [
+        single("gain", "gain", lambda: 1.0 + _either_sign(random, 0.015, 0.1), 1.0),
+        single("offset", "offset", lambda: _either_sign(random, *offset)),
+        single("drift", "drift", lambda: _either_sign(random, *drift)),
+        single("lag", "lag", lambda: _log_uniform(random, 1e-3, 1e-2)),
+        single("delay", "delay", lambda: _log_uniform(random, 1e-3, 1e-2)),
+        single(
+            "hum", "mains", lambda: nominal.mains * _log_uniform(random, 4.0, 10.0), nominal.mains
+        ),
+        single("noise", "white", lambda: white * _log_uniform(random, 4.0, 10.0), white),
+        single("quantisation", "bit", lambda: bit * _log_uniform(random, 60.0, 400.0), bit),
+    ]
 
 
-def _rest(random: Random) -> list[Callable[[], Defect]]:
+def _rest(random: Random) -> list[DefectMaker]:
     """Return functions that draw the defects of carriage, tyre and controller."""
 
-    def mass() -> Defect:
-        value = 34.0 * (1.0 + _either_sign(random, 0.02, 0.25))
-        return Defect("mass", "carriage", value, 34.0, True, _replace_fields("", mass=value))
+    def single(
+        kind: str, component: str, nominal: float, name: str, draw: Callable[[], float]
+    ) -> DefectMaker:
+        return _single(kind, component, nominal, "", name, draw)
 
-    def stiffness() -> Defect:
-        value = 50_000.0 * (1.0 + _either_sign(random, 0.04, 0.25))
-        return Defect("stiffness", "tyre", value, 50_000.0, True, _replace_fields("", tyre=value))
+    def mass() -> float:
+        return 34.0 * (1.0 + _either_sign(random, 0.02, 0.25))
 
-    def damping() -> Defect:
-        value = _log_uniform(random, 40.0, 1000.0)
-        return Defect("damping", "tyre", value, 0.0, True, _replace_fields("", tyre_damping=value))
-
-    def hardening() -> Defect:
-        value = _log_uniform(random, 6.0, 80.0)
-        return Defect(
-            "hardening", "tyre", value, 0.0, True, _replace_fields("", tyre_hardening=value)
-        )
-
-    def late() -> Defect:
-        value = _log_uniform(random, 1e-3, 8e-3)
-        return Defect(
-            "delay", "controller", value, 0.0, True, _replace_fields("", computation_delay=value)
-        )
-
-    def missed() -> Defect:
-        value = _log_uniform(random, 0.01, 0.1)
-        return Defect(
-            "missed_ticks", "controller", value, 0.0, True, _replace_fields("", missed=value)
-        )
+    def stiffness() -> float:
+        return 50_000.0 * (1.0 + _either_sign(random, 0.04, 0.25))
 
     def setting() -> Defect:
         # The recording stores the intended setting; the controller runs with another one.
         name = str(random.choice(["kp", "ki", "kff", "filter_force"]))
-        nominal = getattr(Law(), name)
+        nominal = Law()._asdict()[name]
         value = nominal * (1.0 + _either_sign(random, 0.1, 0.5))
         change = lambda truth, law: (truth, law._replace(**{name: value}))  # noqa: E731
         return Defect(f"setting:{name}", "controller", value, nominal, True, change)
 
-    return [mass, stiffness, damping, hardening, late, missed, setting]
+    computer, late = "controller", "computation_delay"
+    return [
+        single("mass", "carriage", 34.0, "mass", mass),
+        single("stiffness", "tyre", 50_000.0, "tyre", stiffness),
+        single("damping", "tyre", 0.0, "tyre_damping", lambda: _log_uniform(random, 40.0, 1000.0)),
+        single("hardening", "tyre", 0.0, "tyre_hardening", lambda: _log_uniform(random, 6.0, 80.0)),
+        single("delay", computer, 0.0, late, lambda: _log_uniform(random, 1e-3, 8e-3)),
+        single("missed_ticks", computer, 0.0, "missed", lambda: _log_uniform(random, 0.01, 0.1)),
+        setting,
+    ]
 
 
-def draw_unnamed(random: Random) -> list[Callable[[], Defect]]:
+def draw_unnamed(random: Random) -> list[DefectMaker]:
     """Return functions that draw defects without a name in the reports."""
     any_lvdt = str(random.choice(SENSORS[:3]))
     any_cylinder = str(random.choice(["ground", "structure"]))
 
-    def unnamed(kind: str, component: str, value: float, change: Change) -> Callable[[], Defect]:
+    def unnamed(kind: str, component: str, value: float, change: Change) -> DefectMaker:
         return lambda: Defect(kind, component, value, 0.0, False, change)
 
-    relaxing, wave, fading = (
-        _log_uniform(random, 0.15, 0.6),
-        _log_uniform(random, 0.25, 0.8),
-        _either_sign(random, 0.15, 0.5),
-    )
+    relaxing = _log_uniform(random, 0.15, 0.6)
+    wave = _log_uniform(random, 0.25, 0.8)
+    fading = _either_sign(random, 0.15, 0.5)
     drag, curvature = _log_uniform(random, 150.0, 1500.0), _either_sign(random, 0.03, 0.15)
-    slowdown, creep, crosstalk = (
-        _log_uniform(random, 0.04, 0.2),
-        _either_sign(random, 3e-5, 2e-4),
-        _either_sign(random, 1.0, 6.0),
-    )
+    slowdown = _log_uniform(random, 0.04, 0.2)
+    creep = _either_sign(random, 3e-5, 2e-4)
+    crosstalk = _either_sign(random, 1.0, 6.0)
     return [
         unnamed(
             "viscoelastic",
@@ -349,7 +293,7 @@ def draw_unnamed(random: Random) -> list[Callable[[], Defect]]:
     ]
 
 
-def named_defects(commands: Array, random: Random) -> list[list[Callable[[], Defect]]]:
+def named_defects(commands: Array, random: Random) -> list[list[DefectMaker]]:
     """Return functions that draw every named defect, grouped by component.
 
     commands: of the test without defects, shape (ticks, 4).
@@ -420,8 +364,10 @@ def effect_size(rig: Truth, law: Law, defect: Defect, commands: Array) -> float:
     ):
         return float("inf")
     defective, true_law = defect.change(rig, law)
+    # Without noise on either side, the difference is the defect's alone.
     change = run_quiet(defective, true_law, commands) - run_quiet(rig, law, commands)
-    noise = np.array([getattr(rig, name).white for name in SENSORS])
+    parts = rig._asdict()
+    noise = np.array([parts[name].white for name in SENSORS])
     return float(np.max(np.sqrt(np.mean(change**2, axis=0)) / noise))
 
 

@@ -22,6 +22,8 @@ ONSET = 1e-4
 """Deflection over which the contact of the tyre sets in, m."""
 NEVER = 1e9
 """Value of a limit that is never reached."""
+Bounds = tuple[float, float, float, float]
+"""Bounds of dry friction: of the rail in positive and in negative direction, then of the rod."""
 
 
 class ReferenceSlider(NamedTuple):
@@ -218,20 +220,14 @@ def dry_bounds(slider: ReferenceSlider, speed: float, position: float) -> tuple[
 
 
 @numba.njit(cache=True, nogil=True)
-def solve(
-    rhs: float,
-    mass: float,
-    rail_up: float,
-    rail_down: float,
-    rod_up: float,
-    rod_down: float,
-    plate: float,
-) -> float:
+def solve(rhs: float, mass: float, bounds: Bounds, plate: float) -> float:
     """Return the velocity of the carriage after a step, m/s.
 
-    Solves m v + F_rail(v) − F_rod(plate − v) = rhs, with impulses in Ns. The left side rises
-    monotonically with v, with jumps where rail or rod stick, so bisection always converges.
+    Solves m v + F_rail(v) − F_rod(plate − v) = rhs, with rhs and bounds as impulses in Ns. The left
+    side rises monotonically with v, with jumps where rail or rod stick, so bisection always
+    converges.
     """
+    rail_up, rail_down, rod_up, rod_down = bounds
     # No friction can move the carriage beyond these bounds: they bracket the root.
     low = min(0.0, plate, rhs / mass) - (rail_up + rail_down + rod_up + rod_down) / mass - 1e-12
     high = max(0.0, plate, rhs / mass) + (rail_up + rail_down + rod_up + rod_down) / mass + 1e-12
@@ -245,6 +241,7 @@ def solve(
         most += rod_down if guess >= plate else -rod_up
         if least <= 0.0 <= most:
             return guess
+    # 60 halvings of a bracket of some m/s end at the resolution of a double.
     for _ in range(60):
         middle = 0.5 * (low + high)
         value = mass * middle - rhs + (rail_up if middle > 0.0 else -rail_down)
@@ -258,30 +255,18 @@ def solve(
 
 @numba.njit(cache=True, nogil=True)
 def slide(
-    truth: Truth,
-    v: float,
-    plate: float,
-    push: float,
-    rail_up: float,
-    rail_down: float,
-    rod_up: float,
-    rod_down: float,
+    truth: Truth, v: float, plate: float, push: float, bounds: Bounds
 ) -> tuple[float, float, float]:
     """Return the next velocity of the carriage, m/s, and the rod's viscous and dry friction, N.
 
-    v, plate: velocities of carriage and plate, m/s; push: all other forces on the carriage, N.
+    v, plate: velocities of carriage and plate, m/s; push: all other forces on the carriage, N;
+    bounds: of dry friction, N.
     """
+    rail_up, rail_down, rod_up, rod_down = bounds
     sliding = plate - v
     viscous = truth.motor.viscous * sliding + truth.motor.drag * sliding * abs(sliding)
-    next_velocity = solve(
-        truth.mass * v + STEP * (push + viscous),
-        truth.mass,
-        STEP * rail_up,
-        STEP * rail_down,
-        STEP * rod_up,
-        STEP * rod_down,
-        plate,
-    )
+    impulses = (STEP * rail_up, STEP * rail_down, STEP * rod_up, STEP * rod_down)
+    next_velocity = solve(truth.mass * v + STEP * (push + viscous), truth.mass, impulses, plate)
     if next_velocity > plate:
         return next_velocity, viscous, -rod_down
     if next_velocity < plate:
@@ -302,22 +287,19 @@ def plate_under_load(
     deflection: float,
     pull: float,
     push: float,
-    rail_up: float,
-    rail_down: float,
-    rod_up: float,
-    rod_down: float,
+    bounds: Bounds,
 ) -> float:
     """Return the load of a compliant structure plate, N, by bisection; pull: motor force, N.
 
     A greater load lets the plate run ahead, which reduces the load, so the balance is monotone.
     """
     lag = truth.load_lag + STEP
-    reach = rod_up + rod_down + 1.0 + abs(pull)
+    reach = bounds[2] + bounds[3] + 1.0 + abs(pull)
     low, high = pull - reach, pull + reach
     for _ in range(45):
         load = 0.5 * (low + high)
         plate = unloaded + (truth.structure_hydraulic.compliance * load - deflection) / lag
-        _, viscous, dry_force = slide(truth, v, plate, push, rail_up, rail_down, rod_up, rod_down)
+        _, viscous, dry_force = slide(truth, v, plate, push, bounds)
         if load > pull - viscous - dry_force:
             high = load
         else:
@@ -343,6 +325,7 @@ def pass_command(
     play does, as of a position.
     """
     length = len(history)
+    # Rings of 2048 steps hold 0.1 s: no delay of this rig is longer.
     history[count % length] = command
     steps_back = (drive.delay + computation_delay) / STEP
     whole = int(steps_back)
@@ -363,6 +346,7 @@ def pass_command(
             elif wanted < memory[2] - drive.dead_zone:
                 memory[2] = wanted + drive.dead_zone
             wanted = memory[2]
+    # Gain after the dead zone, so that the zone is in the command's own unit.
     wanted *= drive.gain * (1.0 - drive.fading * time / 60.0)
     wanted = max(-drive.limit, min(drive.limit, wanted))
     most = drive.rate * STEP
@@ -388,8 +372,9 @@ def hydraulic_step(cylinder: Hydraulic, z: Array, plate: float, command: float) 
     b2, b1, b0 = 1817.0 * w**2, 7.719e4 * w**3, 6.243e5 * w**4
     scale = 6.281e5 / 6.243e5
     z0, z1, z2, z3 = z[0], z[1], z[2], z[3]
+    # Midpoint rule: a half step with the slope of the start, a whole one with that of the middle.
     for half in range(2):
-        # Observer form: the output is the first state. Two passes make the midpoint rule.
+        # Observer form: the output is the first state.
         d0 = z1 - a3 * z0
         d1 = z2 - a2 * z0 + scale * b2 * command
         d2 = z3 - a1 * z0 + scale * b1 * command
@@ -399,6 +384,7 @@ def hydraulic_step(cylinder: Hydraulic, z: Array, plate: float, command: float) 
     z[0], z[1], z[2], z[3] = z0, z1, z2, z3
     # The servo valve saturates: the piston follows the linear response up to its largest speed.
     most = cylinder.speed * STEP
+    # A creeping piston drifts however it is commanded, as a leaking valve makes it.
     return plate + max(-most, min(most, z0 - plate)) + cylinder.creep * STEP
 
 
@@ -416,6 +402,7 @@ def take_up(cylinder: Hydraulic, plate: float, piston: float) -> float:
 def settle(z: Array, position: float, cylinder: Hydraulic) -> None:
     """Set the states of a cylinder at rest to a position, m."""
     w, scale = 1.0 - cylinder.slowdown, 6.281e5 / 6.243e5
+    # Steady state of the observer form: every derivative of `hydraulic_step` is zero.
     a3, a2, a1 = 165.9 * w, 6674.0 * w**2, 8.598e4 * w**3
     z[0], z[1] = position, a3 * position
     z[2] = a2 * position - scale * 1817.0 * w**2 * position
@@ -442,6 +429,7 @@ def reading(
         history[:] = value
         memory[0] = value
     history[tick % length] = value
+    # Sensors are sampled once per tick of 1 ms.
     ticks_back = sensor.delay / 1e-3
     whole = int(ticks_back)
     fraction = ticks_back - whole
@@ -460,6 +448,7 @@ def reading(
         + sensor.crosstalk * acceleration
     )
     x += noise
+    # Noise before rounding: it dithers the converter.
     return round(x / sensor.bit) * sensor.bit if sensor.bit > 0.0 else x
 
 
@@ -469,7 +458,7 @@ class ReferenceBody(NamedTuple):
     Attributes
     ----------
     motion : ndarray
-        Entries of `ENTRIES`, shape (19,).
+        Motion of the rig, entries as named below, shape (19,).
     histories : ndarray
         Rings of past commands: voltage, ground, structure, shape (3, 2048).
     memories : ndarray
@@ -491,37 +480,14 @@ class ReferenceBody(NamedTuple):
     structure_z: Array
 
 
-ENTRIES = (
-    *(
-        "ground",
-        "structure",
-        "position",
-        "velocity",
-        "force",
-        "relaxed",
-        "bristle_rail",
-        "bristle_rod",
-        "rail_end",
-        "rod_end",
-    ),
-    *(
-        "ground_yield",
-        "structure_yield",
-        "ground_before",
-        "structure_before",
-        "acceleration",
-        "cell",
-        "steps",
-        "ground_piston",
-        "structure_piston",
-    ),
-)
-"""Entries of `Body.motion`, in m, N and s.
-
-They are the plates, the carriage, the motor force, the relaxed part of the tyre, the bristles, the
-ends of the play, the yielding now and a step ago, the acceleration of the carriage, the load cell,
-the number of steps, and the pistons.
-"""
+# Entries of `ReferenceBody.motion`, in m, N and s.
+GROUND, STRUCTURE, POSITION, VELOCITY, FORCE = range(5)  # Plates, carriage, motor force.
+RELAXED, BRISTLE_RAIL, BRISTLE_ROD = range(5, 8)  # Relaxed deflection of the tyre, bristles.
+RAIL_END, ROD_END = range(8, 10)  # Trailing ends of the play of rail and rod.
+GROUND_YIELD, STRUCTURE_YIELD = range(10, 12)  # Yielding of the plates.
+GROUND_BEFORE, STRUCTURE_BEFORE = range(12, 14)  # The same a step ago.
+ACCELERATION, CELL, STEPS = range(14, 17)  # Acceleration of the carriage, load cell, steps so far.
+GROUND_PISTON, STRUCTURE_PISTON = range(17, 19)  # Pistons of the cylinders.
 
 
 @numba.njit(cache=True, nogil=True)
@@ -543,9 +509,11 @@ def at_rest(
         np.zeros(4),
     )
     ground = ground_command * truth.ground.gain
+    # The tyre carries the preload, so the carriage stands lower by its deflection.
     x = ground - preload / truth.tyre
     settle(body.ground_z, ground, truth.ground_hydraulic)
     settle(body.structure_z, x, truth.structure_hydraulic)
+    # As if these commands had been held for longer than any delay.
     first = (preload / truth.motor_constant, ground_command, structure_command)
     for number in range(3):
         body.histories[number, :] = first[number]
@@ -553,9 +521,10 @@ def at_rest(
     body.memories[1, 0] = body.memories[1, 1] = first[1] * truth.ground.gain
     body.memories[2, 0] = body.memories[2, 1] = first[2] * truth.structure.gain
     body.memories[1, 2], body.memories[2, 2] = first[1], first[2]
-    body.motion[0], body.motion[1], body.motion[2], body.motion[8] = ground, x, x, x
-    body.motion[4] = body.motion[15] = preload
-    body.motion[17], body.motion[18] = ground, x
+    motion = body.motion
+    motion[GROUND], motion[STRUCTURE], motion[POSITION], motion[RAIL_END] = ground, x, x, x
+    motion[FORCE] = motion[CELL] = preload
+    motion[GROUND_PISTON], motion[STRUCTURE_PISTON] = ground, x
     return body
 
 
@@ -563,8 +532,9 @@ def at_rest(
 def true_values(body: ReferenceBody) -> tuple[float, float, float, float]:
     """Return the readings of ideal sensors: ground, structure and travel, m, and load cell, N."""
     motion = body.motion
-    ground, structure = motion[0] + motion[10], motion[1] + motion[11]
-    return ground, structure, structure - motion[2], motion[15]
+    ground = motion[GROUND] + motion[GROUND_YIELD]
+    structure = motion[STRUCTURE] + motion[STRUCTURE_YIELD]
+    return ground, structure, structure - motion[POSITION], motion[CELL]
 
 
 @numba.njit(cache=True, nogil=True)
@@ -576,7 +546,7 @@ def sample(truth: Truth, body: ReferenceBody, tick: int, noise: Array, out: Arra
         out[number] = reading(
             sensors[number],
             values[number],
-            body.motion[14],
+            body.motion[ACCELERATION],
             body.sensed[number],
             body.lags[number],
             tick,
@@ -629,162 +599,137 @@ def bristle_force(
 
 
 @numba.njit(cache=True, nogil=True)
+def drive_actuators(
+    truth: Truth, body: ReferenceBody, commands: Array, time: float
+) -> tuple[float, float, float]:
+    """Advance the commands' paths and the pistons by one step.
+
+    Returns the voltage, V, and the next positions of ground and structure plate, m.
+    """
+    motion, count, late = body.motion, int(body.motion[STEPS]), truth.computation_delay
+    paths, rings = body.memories, body.histories
+    voltage = pass_command(truth.voltage, paths[0], rings[0], count, commands[3], True, time, late)
+    # The amplifier ends at ±10 V, the motor at ±1860 N.
+    most = 1860.0 / truth.motor_constant
+    voltage = max(-most, min(most, max(-10.0, min(10.0, voltage))))
+    ground_command = pass_command(
+        truth.ground, paths[1], rings[1], count, commands[0], False, time, late
+    )
+    structure_command = pass_command(
+        truth.structure, paths[2], rings[2], count, commands[1], False, time, late
+    )
+    motion[STEPS] = count + 1
+    motion[GROUND_PISTON] = hydraulic_step(
+        truth.ground_hydraulic, body.ground_z, motion[GROUND_PISTON], ground_command
+    )
+    motion[STRUCTURE_PISTON] = hydraulic_step(
+        truth.structure_hydraulic, body.structure_z, motion[STRUCTURE_PISTON], structure_command
+    )
+    ground = take_up(truth.ground_hydraulic, motion[GROUND], motion[GROUND_PISTON])
+    structure = take_up(truth.structure_hydraulic, motion[STRUCTURE], motion[STRUCTURE_PISTON])
+    return voltage, ground, structure
+
+
+@numba.njit(cache=True, nogil=True)
+def friction_bounds(truth: Truth, motion: Array, sliding: float, rod_position: float) -> Bounds:
+    """Return the bounds of dry friction, N: the rail's up and down, the rod's up and down.
+
+    sliding, rod_position: velocity, m/s, and position, m, of the plate against the carriage.
+    """
+    x = motion[POSITION]
+    rail_up, rail_down = dry_bounds(truth.rail, motion[VELOCITY], x)
+    rod_up, rod_down = dry_bounds(truth.motor, sliding, rod_position)
+    # Friction behind a play is felt only at the play's ends.
+    if truth.rail.play > 0.0:
+        motion[RAIL_END], up, down = end_of_play(truth.rail.play, x, motion[RAIL_END])
+        rail_up, rail_down = rail_up if up else 0.0, rail_down if down else 0.0
+    if truth.motor.play > 0.0:
+        motion[ROD_END], up, down = end_of_play(truth.motor.play, rod_position, motion[ROD_END])
+        rod_up, rod_down = rod_up if up else 0.0, rod_down if down else 0.0
+    return rail_up, rail_down, rod_up, rod_down
+
+
+@numba.njit(cache=True, nogil=True)
+def move_carriage(
+    truth: Truth, motion: Array, plate: float, push: float, bounds: Bounds
+) -> tuple[float, float, float]:
+    """Return the next velocity of the carriage, m/s, and the rod's viscous and dry friction, N.
+
+    plate: velocity of the structure plate, m/s; push: all other forces on the carriage, N; bounds:
+    of dry friction, by `friction_bounds`.
+    """
+    v, (rail_up, rail_down, rod_up, rod_down) = motion[VELOCITY], bounds
+    if truth.bristle <= 0.0:
+        return slide(truth, v, plate, push, bounds)
+    sliding = plate - v
+    viscous = truth.motor.viscous * sliding + truth.motor.drag * sliding * abs(sliding)
+    # The bristle sees the bound of the direction in which it is bent further.
+    bound = rail_up if v > 0.0 else rail_down
+    rail_force, motion[BRISTLE_RAIL] = bristle_force(
+        truth.bristle, truth.mass, motion[BRISTLE_RAIL], v, bound
+    )
+    bound = rod_up if sliding > 0.0 else rod_down
+    rod_force, motion[BRISTLE_ROD] = bristle_force(
+        truth.bristle, truth.mass, motion[BRISTLE_ROD], sliding, bound
+    )
+    v += STEP / truth.mass * (push + viscous - rail_force + rod_force)
+    return v, viscous, rod_force
+
+
+@numba.njit(cache=True, nogil=True)
+def advance_step(truth: Truth, body: ReferenceBody, commands: Array, time: float) -> None:
+    """Advance the rig by one step; arguments as in `advance`."""
+    motion, yielding = body.motion, truth.structure_hydraulic.compliance > 0.0
+    voltage, next_ground, next_structure = drive_actuators(truth, body, commands, time)
+    ground, structure, x, v = motion[GROUND], motion[STRUCTURE], motion[POSITION], motion[VELOCITY]
+    ground_yield, structure_yield = motion[GROUND_YIELD], motion[STRUCTURE_YIELD]
+    # Forces on the carriage at the old position, with the velocities over this step. Rates over
+    # this step come from differences, so yielding and play are included.
+    squeeze = (next_ground - ground + ground_yield - motion[GROUND_BEFORE]) / STEP - v
+    tyre, motion[RELAXED] = tyre_force(truth, ground + ground_yield - x, squeeze, motion[RELAXED])
+    plate = (next_structure - structure + structure_yield - motion[STRUCTURE_BEFORE]) / STEP
+    rod_position = structure + structure_yield - x
+    ripple = truth.ripple * math.sin(
+        2.0 * math.pi * rod_position / truth.ripple_pitch + truth.ripple_phase
+    )
+    bounds = friction_bounds(truth, motion, plate - v, rod_position)
+    smooth_rail = truth.rail.viscous * v + truth.rail.drag * v * abs(v)
+    carriage_force = tyre - motion[FORCE] - ripple - smooth_rail
+    unloaded, load = (next_structure - structure) / STEP, 0.0
+    if yielding:
+        pull = motion[FORCE] + ripple
+        load = plate_under_load(truth, v, unloaded, structure_yield, pull, carriage_force, bounds)
+        compression = truth.structure_hydraulic.compliance * load - structure_yield
+        plate = unloaded + compression / (truth.load_lag + STEP)
+    motion[VELOCITY], smooth_rod, rod_force = move_carriage(
+        truth, motion, plate, carriage_force, bounds
+    )
+    # The acceleration feeds the crosstalk of the load cell.
+    motion[ACCELERATION] = (motion[VELOCITY] - v) / STEP
+    motion[POSITION] += STEP * motion[VELOCITY]
+    # Exact step of the motor's lag, with the voltage constant over it.
+    motion[FORCE] += (1.0 - math.exp(-STEP / truth.electrical_lag)) * (
+        truth.motor_constant * voltage - motion[FORCE]
+    )
+    motion[CELL] = motion[FORCE] + ripple - smooth_rod - rod_force
+    # The yielding of a step ago gives the plate's velocity in the next step.
+    motion[GROUND_BEFORE], motion[STRUCTURE_BEFORE] = ground_yield, structure_yield
+    motion[GROUND_YIELD] += (
+        STEP / (truth.load_lag + STEP) * (-truth.ground_hydraulic.compliance * tyre - ground_yield)
+    )
+    if yielding:
+        motion[STRUCTURE_YIELD] += STEP * (plate - unloaded)
+        # If rod and rail both stick, only the deflection of the plate determines the force.
+        motion[CELL] = load
+    motion[GROUND], motion[STRUCTURE] = next_ground, next_structure
+
+
+@numba.njit(cache=True, nogil=True)
 def advance(truth: Truth, body: ReferenceBody, commands: Array, time: float) -> None:
     """Advance the rig by one tick.
 
     commands: ground, m, structure, m, force, N, which is ignored, and voltage, V, shape (4,); time:
     of the tick, s.
     """
-    motion, histories, memories = body.motion, body.histories, body.memories
-    ground_z, structure_z, held = body.ground_z, body.structure_z, commands
-    ground, structure, x, v, force, relaxed = (
-        motion[0],
-        motion[1],
-        motion[2],
-        motion[3],
-        motion[4],
-        motion[5],
-    )
-    bristle_rail, bristle_rod, rail_end, rod_end = motion[6], motion[7], motion[8], motion[9]
-    ground_yield, structure_yield, ground_before, structure_before = (
-        motion[10],
-        motion[11],
-        motion[12],
-        motion[13],
-    )
-    acceleration, cell, count = motion[14], motion[15], int(motion[16])
     for _ in range(round(1e-3 / STEP)):
-        voltage = pass_command(
-            truth.voltage,
-            memories[0],
-            histories[0],
-            count,
-            held[3],
-            True,
-            time,
-            truth.computation_delay,
-        )
-        # The amplifier ends at ±10 V, the motor at ±1860 N.
-        voltage = max(
-            -1860.0 / truth.motor_constant,
-            min(1860.0 / truth.motor_constant, max(-10.0, min(10.0, voltage))),
-        )
-        ground_command = pass_command(
-            truth.ground,
-            memories[1],
-            histories[1],
-            count,
-            held[0],
-            False,
-            time,
-            truth.computation_delay,
-        )
-        structure_command = pass_command(
-            truth.structure,
-            memories[2],
-            histories[2],
-            count,
-            held[1],
-            False,
-            time,
-            truth.computation_delay,
-        )
-        count += 1
-        motion[17] = hydraulic_step(truth.ground_hydraulic, ground_z, motion[17], ground_command)
-        motion[18] = hydraulic_step(
-            truth.structure_hydraulic, structure_z, motion[18], structure_command
-        )
-        next_ground = take_up(truth.ground_hydraulic, ground, motion[17])
-        next_structure = take_up(truth.structure_hydraulic, structure, motion[18])
-
-        # Forces on the carriage at the old position, with the velocities over this step.
-        deflection = ground + ground_yield - x
-        # Rates over this step come from differences, so yielding and play are included.
-        squeeze = (next_ground - ground + ground_yield - ground_before) / STEP - v
-        tyre, relaxed = tyre_force(truth, deflection, squeeze, relaxed)
-
-        plate = (next_structure - structure + structure_yield - structure_before) / STEP
-        rod_position = structure + structure_yield - x
-        sliding = plate - v
-        ripple = truth.ripple * math.sin(
-            2.0 * math.pi * rod_position / truth.ripple_pitch + truth.ripple_phase
-        )
-        rail_up, rail_down = dry_bounds(truth.rail, v, x)
-        rod_up, rod_down = dry_bounds(truth.motor, sliding, rod_position)
-        if truth.rail.play > 0.0:
-            rail_end, up, down = end_of_play(truth.rail.play, x, rail_end)
-            rail_up, rail_down = rail_up if up else 0.0, rail_down if down else 0.0
-        if truth.motor.play > 0.0:
-            rod_end, up, down = end_of_play(truth.motor.play, rod_position, rod_end)
-            rod_up, rod_down = rod_up if up else 0.0, rod_down if down else 0.0
-        smooth_rail = truth.rail.viscous * v + truth.rail.drag * v * abs(v)
-        carriage_force = tyre - force - ripple - smooth_rail
-        previous_v = v
-        unloaded, load = (next_structure - structure) / STEP, 0.0
-        if truth.structure_hydraulic.compliance > 0.0:
-            load = plate_under_load(
-                truth,
-                v,
-                unloaded,
-                structure_yield,
-                force + ripple,
-                carriage_force,
-                rail_up,
-                rail_down,
-                rod_up,
-                rod_down,
-            )
-            compression = truth.structure_hydraulic.compliance * load - structure_yield
-            plate = unloaded + compression / (truth.load_lag + STEP)
-        sliding = plate - v
-        smooth_rod = truth.motor.viscous * sliding + truth.motor.drag * sliding * abs(sliding)
-        if truth.bristle > 0.0:
-            bound = rail_up if v > 0.0 else rail_down
-            rail_force, bristle_rail = bristle_force(
-                truth.bristle, truth.mass, bristle_rail, v, bound
-            )
-            bound = rod_up if sliding > 0.0 else rod_down
-            rod_force, bristle_rod = bristle_force(
-                truth.bristle, truth.mass, bristle_rod, sliding, bound
-            )
-            v += STEP / truth.mass * (carriage_force + smooth_rod - rail_force + rod_force)
-        else:
-            v, smooth_rod, rod_force = slide(
-                truth, v, plate, carriage_force, rail_up, rail_down, rod_up, rod_down
-            )
-        # The acceleration feeds the crosstalk of the load cell.
-        acceleration = (v - previous_v) / STEP
-        x += STEP * v
-        # Exact step of the motor's lag, with the voltage constant over it.
-        force += (1.0 - math.exp(-STEP / truth.electrical_lag)) * (
-            truth.motor_constant * voltage - force
-        )
-        cell = force + ripple - smooth_rod - rod_force
-        # The yielding of a step ago gives the plate's velocity in the next step.
-        ground_before, structure_before = ground_yield, structure_yield
-        ground_yield += (
-            STEP
-            / (truth.load_lag + STEP)
-            * (-truth.ground_hydraulic.compliance * tyre - ground_yield)
-        )
-        if truth.structure_hydraulic.compliance > 0.0:
-            structure_yield += STEP * (plate - unloaded)
-            # If rod and rail both stick, only the deflection of the plate determines the force.
-            cell = load
-        ground, structure = next_ground, next_structure
-    motion[0], motion[1], motion[2], motion[3], motion[4], motion[5] = (
-        ground,
-        structure,
-        x,
-        v,
-        force,
-        relaxed,
-    )
-    motion[6], motion[7], motion[8], motion[9] = bristle_rail, bristle_rod, rail_end, rod_end
-    motion[10], motion[11], motion[12], motion[13] = (
-        ground_yield,
-        structure_yield,
-        ground_before,
-        structure_before,
-    )
-    motion[14], motion[15], motion[16] = acceleration, cell, count
+        advance_step(truth, body, commands, time)

@@ -49,6 +49,62 @@ class Law(NamedTuple):
     limit: float = 10.0
 
 
+class LawState(NamedTuple):
+    """Memory of the controller between ticks.
+
+    Attributes
+    ----------
+    sample, travel, speed, force : float
+        Travel as measured, m, and filtered travel, m, speed, m/s, and force, N.
+    integral : float
+        Integral of the force loop, N.
+    position, velocity : float
+        Simulated body, m and m/s.
+    """
+
+    sample: float
+    travel: float
+    speed: float
+    force: float
+    integral: float
+    position: float
+    velocity: float
+
+
+@numba.njit(cache=True, nogil=True)
+def control(
+    law: Law, state: LawState, sensed: Array, demand: Array
+) -> tuple[LawState, float, float, float]:
+    """Return the state after one tick, and the commands: structure, m, force, N, and voltage, V.
+
+    sensed: readings, shape (4,); demand: ground, m, structure, m, and force, N, shape (3,).
+    """
+    # First-order lags, implicit Euler at 1 ms.
+    travel = state.travel + 1e-3 / (law.filter_position + 1e-3) * (sensed[2] - state.travel)
+    speed = state.speed + 1e-3 / (law.filter_velocity + 1e-3) * (
+        (sensed[2] - state.sample) / 1e-3 - state.speed
+    )
+    force = state.force + 1e-3 / (law.filter_force + 1e-3) * (sensed[3] - state.force)
+    model, velocity = state.position, state.velocity
+    if law.imposed:
+        demanded, position = demand[2], demand[1]
+    else:
+        # F = F_0 − k x − b v: the suspension in the model.
+        demanded = law.preload - law.stiffness * travel - law.damping * speed
+        # Semi-implicit Euler: the velocity first, then the position with the new velocity.
+        velocity += (force / law.sprung_mass - law.gravity) * 1e-3
+        model += velocity * 1e-3
+        position = model
+    error = demanded - force
+    integral = state.integral + law.ki * error * 1e-3
+    voltage = (law.kff * demanded + law.kp * error + integral) / 186.0
+    # Anti-windup: the integral stands still while the voltage saturates.
+    if abs(voltage) >= law.limit:
+        voltage, integral = max(-law.limit, min(law.limit, voltage)), state.integral
+    after = LawState(sensed[2], travel, speed, force, integral, model, velocity)
+    return after, position, demanded, voltage
+
+
 @numba.njit(cache=True, nogil=True)
 def simulate(
     truth: Truth,
@@ -78,55 +134,27 @@ def simulate(
         Recorded commands and sensors, written in place, shape (ticks, 4).
     """
     body = at_rest(truth, demands[0, 0], law.start, law.preload)
-    previous_travel = travel = speed = filtered_force = integral = 0.0
-    plate_model, plate_speed = law.start, 0.0
+    state = LawState(0.0, 0.0, 0.0, 0.0, 0.0, law.start, 0.0)
+    # The commands before the first tick: the rig has stood still under its preload.
     held = np.array([demands[0, 0], law.start, law.preload, law.preload / 186.0])
     for tick in range(len(demands)):
-        time = tick * 1e-3
         sample(truth, body, tick, noise[tick], sensors[tick])
+        if tick == 0:
+            # The filters start settled at the first sample.
+            first, load = sensors[0, 2], sensors[0, 3]
+            state = LawState(first, first, 0.0, load, 0.0, law.start, 0.0)
         if missed[tick] == 0.0:
-            measured_travel, measured_force = sensors[tick, 2], sensors[tick, 3]
-            if tick == 0:
-                previous_travel, travel, filtered_force = (
-                    measured_travel,
-                    measured_travel,
-                    measured_force,
-                )
-            # First-order lags, implicit Euler at 1 ms.
-            travel += 1e-3 / (law.filter_position + 1e-3) * (measured_travel - travel)
-            speed += (
-                1e-3
-                / (law.filter_velocity + 1e-3)
-                * ((measured_travel - previous_travel) / 1e-3 - speed)
-            )
-            filtered_force += 1e-3 / (law.filter_force + 1e-3) * (measured_force - filtered_force)
-            previous_travel = measured_travel
-            if law.imposed:
-                demanded_force, position = demands[tick, 2], demands[tick, 1]
-            else:
-                # F = F_0 − k x − b v: the suspension in the model.
-                demanded_force = law.preload - law.stiffness * travel - law.damping * speed
-                # Semi-implicit Euler: the velocity first, then the position with the new velocity.
-                plate_speed += (filtered_force / law.sprung_mass - law.gravity) * 1e-3
-                plate_model += plate_speed * 1e-3
-                position = plate_model
-            error = demanded_force - filtered_force
-            next_integral = integral + law.ki * error * 1e-3
-            voltage = (law.kff * demanded_force + law.kp * error + next_integral) / 186.0
-            # Anti-windup: the integral stands still while the voltage saturates.
-            if abs(voltage) >= law.limit:
-                voltage = max(-law.limit, min(law.limit, voltage))
-            else:
-                integral = next_integral
+            state, position, demanded, voltage = control(law, state, sensors[tick], demands[tick])
+            # A replay imposes recorded commands; the controller's own are computed and dropped.
             if len(voltages):
                 position, voltage = demands[tick, 1], voltages[tick]
-            held[0], held[1], held[2], held[3] = demands[tick, 0], position, demanded_force, voltage
+            held[0], held[1], held[2], held[3] = demands[tick, 0], position, demanded, voltage
         for number in range(4):
             commands[tick, number] = held[number]
         # The limits of the rig: 0.15 m of the structure plate, 1500 N of the load cell.
         if len(voltages) == 0 and (abs(sensors[tick, 1]) > 0.15 or abs(sensors[tick, 3]) > 1500.0):
             return tick + 1
-        advance(truth, body, held, time)
+        advance(truth, body, held, tick * 1e-3)
     return len(demands)
 
 
@@ -155,6 +183,7 @@ def draw_noise(truth: Truth, ticks: int, random: np.random.Generator) -> tuple[A
     for number, sensor in enumerate(
         (truth.ground_lvdt, truth.structure_lvdt, truth.suspension_lvdt, truth.load_cell)
     ):
+        # One phase per sensor, for the whole test: the mains is not synchronised with the ticks.
         mains = sensor.mains * np.sin(2 * np.pi * 50.0 * time + random.uniform(0.0, 2.0 * np.pi))
         noise[:, number] = sensor.white * random.standard_normal(ticks) + mains
     missed = (random.random(ticks) < truth.missed).astype(float)

@@ -41,6 +41,7 @@ class ScoreRow:
 
 def wilson(hits: int, count: int) -> tuple[float, float]:
     """Return the 95 % score interval of a share (Wilson, JASA 22 (1927) 209)."""
+    # Without a case the share is unknown.
     if count == 0:
         return 0.0, 1.0
     # z is the 97.5 % quantile of the normal distribution.
@@ -70,6 +71,7 @@ def names(answer: dict[str, Any]) -> list[str]:
     for effect in answer["effects"]:
         kind = effect["kind"]
         if kind == "setting":
+            # The key names which setting differs.
             kind = f"setting:{next(iter(effect['parameters']))}"
         effects.append(f"{kind}@{effect['component']}")
     return effects
@@ -91,6 +93,7 @@ def _error(entry: dict[str, Any], answer: dict[str, Any]) -> float:
     """Return the error of a correctly named magnitude, relative to its deviation from nominal."""
     truth = entry["effects"][0]
     value = next(iter(answer["effects"][0]["parameters"].values()))["value"]
+    # Limits have no nominal value (infinite), and are compared with zero.
     nominal = truth["nominal"] or 0.0
     # Relative to the defect itself: 1 % of the total stiffness may be all of a defect.
     return abs(value - truth["value"]) / max(abs(truth["value"] - nominal), 1e-12)
@@ -109,6 +112,7 @@ def rows(result: Result) -> list[ScoreRow]:
     null = [a for k, a in pairs if k["sort"] == "null"]
     seconds = [a["seconds"] for _, a in pairs]
     right = [bool(names(a)) and names(a)[0] == truths(k)[0] for k, a in single]
+    # Magnitudes of wrong names mean something else, so they do not count.
     errors = [_error(k, a) for (k, a), hit in zip(single, right, strict=True) if hit]
     return [
         *_single_rows(single, right),
@@ -184,6 +188,7 @@ def _pair_rows(double: Sequence[Pair]) -> list[ScoreRow]:
 
 def _shrinkage_rows(answers: Sequence[dict[str, Any]]) -> list[ScoreRow]:
     """Return the measures of predicted and achieved shrinkage of the gap."""
+    # Close to the noise floor a share of the gap is a ratio of two noises.
     gaps = [a["gap"] for a in answers if a["gap"] and a["effects"] and a["gap"]["before"] > VISIBLE]
     deviations = [abs(g["shrinkage_predicted"] - g["shrinkage_held_out"]["value"]) for g in gaps]
     worse = sum(g["shrinkage_held_out"]["value"] < WORSE for g in gaps)
@@ -217,6 +222,7 @@ def _is_settled(entry: dict[str, Any], answer: dict[str, Any]) -> bool:
 def _baselines(result: Result, single: list[Pair]) -> list[ScoreRow]:
     """Return the scores of two baselines: always the same name, and the black box."""
     rows_of_baselines = []
+    # Whoever always guesses the commonest defect sets the lowest bar.
     counts = Counter(truths(k)[0] for k, _ in single)
     if counts:
         name, hits = counts.most_common(1)[0]
@@ -269,6 +275,7 @@ def misses(result: Result) -> list[str]:
             )
             right = answer["verdict"] in ("unknown", "partly explained") and placed
         else:
+            # The verdict counts too: the right name with a doubt is not the right answer.
             right = set(truth) == set(named) and answer["verdict"] in ("explained", "no gap")
         if not right:
             sizes = ", ".join(

@@ -78,6 +78,7 @@ class RigRun:
     @property
     def key(self) -> str:
         """Hash of rig and run, under which the result is stored."""
+        # The repr of a NamedTuple holds every parameter to the last digit.
         return hashlib.sha256(f"{self.truth!r} {self.run.key}".encode()).hexdigest()[:32]
 
 
@@ -93,6 +94,8 @@ def draw_rig(seed: int, number: int) -> tuple[Truth, Defect, np.random.Generator
     # Tolerances differ from rig to rig, as they would in a laboratory.
     plain = draw_tolerated(random)
     drawn = [make() for make in friction("motor", random)]
+    # All are drawn, in a fixed order: the random numbers of the recording then do not depend on the
+    # kind.
     options = [defect for defect in drawn if defect.kind in KINDS]
     defect = options[number % len(options)]
     truth, _ = defect.change(plain, Law())
@@ -203,12 +206,11 @@ def _posterior(toml: str) -> Posterior:
 
 
 def _run_all(
-    bench: Bench,
-    truth: Truth,
-    candidates: list[Settings],
+    bench: Bench, truth: Truth, candidates: list[Settings]
 ) -> list[list[dict[str, float]]]:
     """Run every candidate on a rig over the held-out roads; return one row per candidate."""
     base, count = bench.study.configuration, bench.study.budget.held_out
+    # Numbers from APART on are roads that no tuning has seen.
     roads = [Scenario(APART + road, base.plant) for road in range(count)]
     jobs = [
         [RigRun(truth, bench.plan(base, candidate, road)) for road in roads]
@@ -236,6 +238,7 @@ def text(study: Study, cases: list[TuningCase]) -> str:
             continue
         change_on_rig = case.against_nominal.change_of(objective.name)
         change_from_baseline = case.against_before.change_of(objective.name)
+        # Worse only if the whole interval of the change lies above zero.
         better, worse = better + change_on_rig.improved, worse + (change_on_rig.low > 0.0)
         spreads, unit = (change_on_rig.before, change_on_rig.after), objective.unit
         medians = [f"{number_text(spread.median)} {unit}" for spread in spreads]

@@ -329,11 +329,7 @@ def _record_carriage(
         friction, elastic, 95.1, GAINS, reference, noise, sag, bit, period
     )
     columns = {
-        "/command": {
-            "reference": reference,
-            "pulse_voltage": np.zeros(len(time)),
-            "force": force,
-        },
+        "/command": {"reference": reference, "pulse_voltage": np.zeros(len(time)), "force": force},
         "/sensor": {"position": positions},
     }
     return WildData(columns, period, _true_sizes(case, friction))

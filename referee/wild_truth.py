@@ -124,8 +124,11 @@ def step_friction(
         friction.slip * (1.0 + (friction.breakaway - 1.0) * fade)
         + friction.load_friction * abs(load)
     )
+    # Wear ends at no friction, or a long test would have a negative one.
     viscous = warm * friction.viscous * max(1.0 - friction.wear_rate * time, 0.0) * speed
     if friction.tanh_speed > 0.0:
+        # A tanh has no true stiction: the joint creeps under a constant force, as in many
+        # simulators.
         return size * math.tanh(speed / friction.tanh_speed) + viscous, bristle
     # Implicit Euler: the bristle's time constant is much shorter than a step at high speed.
     bristle = (bristle + speed * step) / (1.0 + abs(speed) * step / friction.bristle)
@@ -140,13 +143,28 @@ def elastic_force(elastic: ElasticTruth, position: float) -> float:
 
 
 @numba.njit
+def carry_rider(
+    elastic: ElasticTruth, x: float, v: float, rider: float, speed: float, h: float
+) -> tuple[float, float, float]:
+    """Return the force on the second mass, N, and its position and speed after a step, m, m/s.
+
+    x, v: position, m, and speed, m/s, of the mass that carries it; rider, speed: its own; h: s.
+    """
+    w = 2.0 * math.pi * elastic.frequency
+    force = elastic.rider * (w * w * (x - rider) + 2.0 * elastic.ratio * w * (v - speed))
+    # Semi-implicit Euler: the speed first, which keeps the oscillation's energy.
+    speed += h * force / elastic.rider
+    return force, rider + h * speed, speed
+
+
+@numba.njit
 def _imposed_force(
     friction: FrictionTruth, elastic: ElasticTruth, x: Array, h: float, mass: float
 ) -> Array:
     """Return the force that moves the end of a bench as prescribed, N, at every step."""
+    # The motion starts from rest: bristle and springs are slack.
     force, z, inner = np.zeros(len(x)), 0.0, x[0]
     rider, speed = x[0], 0.0
-    w = 2.0 * math.pi * elastic.frequency
     for n in range(1, len(x)):
         time, v = n * h, (x[n] - x[n - 1]) / h
         if elastic.frame > 0.0:
@@ -155,6 +173,7 @@ def _imposed_force(
             inner_speed, low, high = v, -FASTEST, FASTEST
             for _ in range(HALVINGS):
                 inner_speed = 0.5 * (low + high)
+                # The bristle of a trial speed is dropped: only the final one is a step.
                 resistance, _z = step_friction(friction, z, inner_speed, 0.0, time, h)
                 inner_position = inner + inner_speed * h
                 if (
@@ -173,11 +192,7 @@ def _imposed_force(
             resistance, z = step_friction(friction, z, v, 0.0, time, h)
             force[n] = resistance + elastic_force(elastic, x[n])
         if elastic.rider > 0.0:
-            rider_force = elastic.rider * (
-                w * w * (x[n] - rider) + 2.0 * elastic.ratio * w * (v - speed)
-            )
-            speed += h * rider_force / elastic.rider
-            rider += h * speed
+            rider_force, rider, speed = carry_rider(elastic, x[n], v, rider, speed, h)
             force[n] += rider_force
         # Second difference of the prescribed motion: the inertia of the moved end.
         if n > 1:
@@ -189,6 +204,7 @@ def imposed_force(
     friction: FrictionTruth, elastic: ElasticTruth, x: Array, period: float, mass: float = 0.0
 ) -> Array:
     """Return the force at every tick, N, for a motion at every integration step, m; mass: kg."""
+    # The motion is sampled at every integration step, the force at every tick.
     return _imposed_force(friction, elastic, x, period / FINE, mass)[::FINE]
 
 
@@ -206,22 +222,18 @@ def _drive_pendulum(
 ) -> Array:
     """Return the angle at every tick, rad, under a torque; arm: weight times lever, Nm."""
     x, v, z, rider, speed = start, 0.0, 0.0, start, 0.0
-    w = 2.0 * math.pi * elastic.frequency
     out = np.zeros(len(torque))
     for tick in range(len(torque)):
         out[tick] = x
         command = torque[tick]
         drive_force = command / (1.0 + sag * abs(command))
         for k in range(substeps):
+            # Load of the bearing times the lever: m·g·cos x and the centripetal m·l·ω², in Nm.
             load = arm * math.cos(x) + mass * v * v
             resistance, z = step_friction(friction, z, v, load, (tick * substeps + k) * h, h)
             total = drive_force - resistance - elastic_force(elastic, x) - arm * math.sin(x)
             if elastic.rider > 0.0:
-                rider_force = elastic.rider * (
-                    w * w * (x - rider) + 2.0 * elastic.ratio * w * (v - speed)
-                )
-                speed += h * rider_force / elastic.rider
-                rider += h * speed
+                rider_force, rider, speed = carry_rider(elastic, x, v, rider, speed, h)
                 total -= rider_force
             v += h * total / mass
             x += h * v
@@ -289,7 +301,7 @@ def _control_carriage(
     """
     to_force, kp, kv = gains
     x, v, z, rider, speed = reference[0], 0.0, 0.0, reference[0], 0.0
-    w, h = 2.0 * math.pi * elastic.frequency, period / substeps
+    h = period / substeps
     positions, force = np.zeros(len(reference)), np.zeros(len(reference))
     previous, previous_mean = reference[0], reference[0]
     for tick in range(len(reference)):
@@ -300,6 +312,7 @@ def _control_carriage(
         mean = 0.5 * (sensed + previous)
         rate = 0.0 if tick == 0 else (mean - previous_mean) / period
         previous, previous_mean = sensed, mean
+        # A cascade: kp makes a speed of the position's error, kv a force of the speed's.
         command = to_force * (kp * kv * (reference[tick] - sensed) - kv * rate)
         positions[tick], force[tick] = sensed, command
         drive_force = command / (1.0 + sag * abs(command))
@@ -307,11 +320,7 @@ def _control_carriage(
             resistance, z = step_friction(friction, z, v, 0.0, (tick * substeps + k) * h, h)
             total = drive_force - resistance - elastic_force(elastic, x)
             if elastic.rider > 0.0:
-                rider_force = elastic.rider * (
-                    w * w * (x - rider) + 2.0 * elastic.ratio * w * (v - speed)
-                )
-                speed += h * rider_force / elastic.rider
-                rider += h * speed
+                rider_force, rider, speed = carry_rider(elastic, x, v, rider, speed, h)
                 total -= rider_force
             v += h * total / mass
             x += h * v
@@ -331,6 +340,7 @@ def control_carriage(
 ) -> tuple[Array, Array]:
     """Return the results of `_control_carriage` with steps that resolve the mass on its bristle."""
     stiffness = (
+        # A tanh adds damping but no stiffness, so FINE steps are enough.
         friction.slip * friction.breakaway / friction.bristle if friction.tanh_speed == 0.0 else 0.0
     )
     substeps = max(FINE, math.ceil(4.0 * period * math.sqrt(stiffness / mass)))
@@ -383,12 +393,15 @@ def _follow_command(
     w = 2.0 * math.pi * resonance[0]
     out = np.zeros(len(command))
     for n in range(len(command)):
+        # Play operator: `play` is half the play.
         after_play = min(max(after_play, command[n] - play), command[n] + play)
         error = after_play - position
         fade_speed = lag * (1.0 + lag_growth * abs(error))
         # Exact step of the lag, so any lag is stable.
         rate = error * (1.0 - math.exp(-h / fade_speed)) / h if lag > 0.0 else error / h
         if speed_limit > 0.0:
+            # A soft limit, as a valve or motor has it: no sharp corner that a library's rate limit
+            # would fit.
             rate = speed_limit * math.tanh(rate / speed_limit)
         position += h * rate
         if w > 0.0:
@@ -406,6 +419,7 @@ def follow_command(truth: FollowerTruth, command: Array, period: float) -> Array
     held = np.repeat(command, FINE)
     # The gain falls linearly during the test.
     held *= 1.0 - truth.gain_loss * np.arange(len(held)) * h
+    # A delay in whole integration steps needs no interpolation of a held command.
     delay_steps = round(truth.delay / h)
     if delay_steps:
         held = np.concatenate([np.full(delay_steps, held[0]), held[:-delay_steps]])
@@ -413,6 +427,7 @@ def follow_command(truth: FollowerTruth, command: Array, period: float) -> Array
     positions = _follow_command(
         held, truth.lag, truth.speed_limit, 0.5 * truth.play, resonance, truth.lag_growth, h
     )
+    # A sample is taken before the command of its tick acts.
     return np.concatenate([[held[0]], positions[FINE - 1 :: FINE][:-1]])
 
 
@@ -421,6 +436,7 @@ def read_sensor(
 ) -> Array:
     """Return the readings of a sensor and its logger, in the unit of the signal."""
     ticks = np.arange(len(signal))
+    # Delay first: eccentricity and noise are those of the delayed sample.
     reading = np.interp(ticks - sensor.delay / period, ticks, signal)
     reading = reading + sensor.eccentric * sensor.pitch * np.sin(
         2.0 * math.pi * reading / sensor.pitch
@@ -439,6 +455,7 @@ def _coloured_noise(
     """Return noise below a corner frequency, in the unit of the sensor."""
     if sensor.coloured == 0.0:
         return np.zeros(count)
+    # Shaped in the frequency domain, and scaled to the stated rms afterwards.
     white = np.fft.rfft(random.standard_normal(count))
     frequency = np.fft.rfftfreq(count, period)
     fade_speed = np.fft.irfft(white / (1.0 + (frequency / sensor.corner) ** 2), count)

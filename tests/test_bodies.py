@@ -11,7 +11,6 @@ from benchmarks import arms
 from rigtwin.components import Base, Body
 from rigtwin.components.body import (
     about_frame,
-    arrange_pseudo_inertia,
     list_parameters,
     turn_gravity,
 )
@@ -22,6 +21,7 @@ from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.fitter import Fitter
 from tests.helpers import arm
 from tests.helpers.arm import MJCF, TOML, described_arm, motion, recording, torques
+from tests.helpers.bodies import arrange_pseudo_inertia
 
 INSIDE = slice(400, -400)
 BODIES = """

@@ -10,7 +10,7 @@ import pytest
 import rigtwin
 from rigtwin.components import ForceSensor, PositionSensor, VelocitySensor
 from rigtwin.components.sensors import apply_sensor
-from rigtwin.models.joint import recover_motion
+from rigtwin.models.measured_motion import recover_motion
 from rigtwin.recording import Recording
 
 PERIOD = 2e-3

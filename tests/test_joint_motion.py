@@ -10,11 +10,13 @@ import pytest
 
 from rigtwin.components import Guide, PositionActuator, with_parameters
 from rigtwin.components.guide import dry_limits, friction, slide
+from rigtwin.components.guide_step import guide_step_of
 from rigtwin.description.catalogue import find
 from rigtwin.description.machine import Machine
 from rigtwin.models.following import follow_command
 from rigtwin.models.joint import JointModel
-from rigtwin.models.joint_motion import Inertia, inverse_dynamics
+from rigtwin.models.joint_inverse import inverse_dynamics
+from rigtwin.models.joint_motion import Inertia
 from rigtwin.recording import Recording
 from rigtwin.signals.noise import smooth
 from tests.helpers.described import described, recording_of
@@ -26,8 +28,8 @@ def moved(guide: Guide, position: np.ndarray, mass: float = 0.0, spring: float =
     velocity = np.gradient(position, PERIOD)
     motion = np.ascontiguousarray(np.stack([position, velocity, np.gradient(velocity, PERIOD)]))
     out = np.empty(len(position))
-    inertia = Inertia(mass, -1.0, 2.0, np.zeros(2), 0.0, turns=False)
-    inverse_dynamics(guide, friction(guide), inertia, spring, PERIOD, motion, out)
+    inertia = Inertia(mass, -1.0, 2.0, np.zeros(2), turns=False)
+    inverse_dynamics(guide_step_of(guide, spring, 0.0, PERIOD), inertia, motion, out)
     return out
 
 

@@ -5,7 +5,7 @@ import pytest
 
 from experiments import EXPERIMENTS
 from rigtwin.components import RigPlant
-from rigtwin.components.yielding import rod_load, share_of_load, solve_yielding, yielding_rate
+from rigtwin.components.yielding import Rod, rod_load, solve_yielding
 from rigtwin.models.quarter_car import QuarterCarModel
 
 RAIL, TIMESTEP = (0.3, 0.2), 1e-3
@@ -17,9 +17,8 @@ RAIL, TIMESTEP = (0.3, 0.2), 1e-3
 @pytest.mark.parametrize("viscous", [0.0, 200.0])
 def test_velocity_and_load_are_solved_exactly(rhs, free, share, viscous):
     inertia, force, forward, backward = 1.5, 30.0, 100.0, 40.0
-    v, load = solve_yielding(
-        rhs, inertia, TIMESTEP, RAIL, free, share, force, viscous, forward, backward
-    )
+    rod = Rod(free, share, force, viscous, forward, backward)
+    v, load = solve_yielding(rod, rhs, inertia, TIMESTEP, RAIL)
     # What is left is the rail's, within its bounds and at one of them while it slides.
     left = rhs - inertia * v - TIMESTEP * load
     assert -RAIL[1] - 1e-9 <= left <= RAIL[0] + 1e-9
@@ -33,18 +32,9 @@ def test_velocity_and_load_are_solved_exactly(rhs, free, share, viscous):
 
 
 def test_a_stiff_plate_moves_as_it_is_driven():
-    _, load = solve_yielding(0.02, 1.5, TIMESTEP, RAIL, 0.7, 1e-12, 30.0, 5.0, 10.0, 10.0)
-    assert load == pytest.approx(rod_load(0.0, 0.7, 1e-12, 30.0, 5.0, 10.0, 10.0), rel=1e-3)
-
-
-@pytest.mark.parametrize("lag", [0.0, 4e-3])
-def test_a_constant_load_is_yielded_to_as_a_lag_of_first_order(lag):
-    compliance, load, h = 1e-6, 400.0, 1e-5
-    yielded, share = 0.0, share_of_load(1e-6, lag, 1e-5)
-    for _ in range(400):
-        yielded += h * yielding_rate(share, load, yielded, lag, h)
-    share_reached = 1.0 - np.exp(-400 * h / lag) if lag else 1.0
-    assert yielded == pytest.approx(compliance * load * share_reached, rel=2e-3)
+    rod = Rod(0.7, 1e-12, 30.0, 5.0, 10.0, 10.0)
+    _, load = solve_yielding(rod, 0.02, 1.5, TIMESTEP, RAIL)
+    assert load == pytest.approx(rod_load(rod, 0.0), rel=1e-3)
 
 
 def integrate_with_a_plate_of_its_own(

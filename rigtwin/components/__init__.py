@@ -14,7 +14,7 @@ from rigtwin.components.guide import Guide, Rail
 from rigtwin.components.library import KINDS, candidates, find, title
 from rigtwin.components.mass import Carriage, Mass
 from rigtwin.components.motor import Motor
-from rigtwin.components.plant import Plant, with_parameters
+from rigtwin.components.plant import Plant, component_of, with_parameters
 from rigtwin.components.quantity import UNLIMITED
 from rigtwin.components.rig import RigPlant
 from rigtwin.components.rotor import Rotor
@@ -66,6 +66,7 @@ __all__ = [
     "Tyre",
     "VelocitySensor",
     "candidates",
+    "component_of",
     "find",
     "measures",
     "title",

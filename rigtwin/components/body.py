@@ -135,31 +135,6 @@ def list_surplus(body: Body, mass: float, centre: Array, inertia: Array) -> Arra
     return list_parameters(body, mass, inertia) - about_frame(mass, centre, inertia)
 
 
-def arrange_pseudo_inertia(parameters: Array) -> Array:
-    """Return the pseudo-inertia matrix of ten inertial parameters.
-
-    With Σ = ½·tr(I)·1 − I and the first moment h, it is [[Σ, h], [hᵀ, m]]. It is positive definite
-    exactly for physically consistent bodies (Wensing, Kim and Slotine 2018).
-
-    Parameters
-    ----------
-    parameters
-        Parameters in the order of `INERTIAL`, shape (10,).
-
-    Returns
-    -------
-    array
-        Pseudo-inertia matrix, shape (4, 4).
-    """
-    mass, mx, my, mz, ixx, iyy, izz, ixy, ixz, iyz = parameters
-    about = np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
-    pseudo_inertia = np.empty((4, 4))
-    pseudo_inertia[:3, :3] = 0.5 * np.trace(about) * np.eye(3) - about
-    pseudo_inertia[:3, 3] = pseudo_inertia[3, :3] = (mx, my, mz)
-    pseudo_inertia[3, 3] = mass
-    return pseudo_inertia
-
-
 def turn_gravity(base: Base, gravity: Array) -> Array:
     """Return gravity in the frame of a tilted base.
 
@@ -187,13 +162,13 @@ def turn_gravity(base: Base, gravity: Array) -> Array:
 
 
 def _displaced(context: Context) -> Starts:
-    reach = float(getattr(context.plant, context.effect.group).reach)
+    reach = float(context.component(Body).reach)
     values = [context.nominal + share * reach for share in (-0.2, -0.05, 0.05, 0.2)]
     return Starts.single(values, 0.005 * reach)
 
 
 def _loaded(context: Context) -> Starts:
-    body: Body = getattr(context.plant, context.effect.group)
+    body = context.component(Body)
     centre = np.array([body.centre_x, body.centre_y, body.centre_z])
     values = []
     for share in PAYLOADS:

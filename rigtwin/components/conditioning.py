@@ -203,7 +203,7 @@ BELOW = (0.95, 0.8, 0.65, 0.5, 0.35, 0.2, 0.1)
 
 
 def _speed_limit(context: Context) -> Starts:
-    known = [share * getattr(context.plant, context.effect.group).speed_limit for share in BELOW]
+    known = [share * context.component(Cylinder).speed_limit for share in BELOW]
     return at_limits([min(pair) for pair in zip(context.swing.fastest, known, strict=True)], 1e-6)
 
 

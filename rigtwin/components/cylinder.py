@@ -78,7 +78,8 @@ class CylinderState(NamedTuple):
 
 def closed_loop(cylinder: Cylinder) -> loop.ClosedLoop:
     """Return the part of a cylinder that a controller can know: H(s), gain, lag and delay."""
-    return loop.ClosedLoop(*(getattr(cylinder, name) for name in loop.ClosedLoop._fields))
+    known = cylinder._asdict()
+    return loop.ClosedLoop(*(known[name] for name in loop.ClosedLoop._fields))
 
 
 def told_settings(cylinder: Cylinder, before: float = 0.0) -> dict[str, float]:

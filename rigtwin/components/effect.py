@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from rigtwin.components.plant import Plant
+from rigtwin.components.plant import C, Plant, component_of, parameter_of
 from rigtwin.components.quantity import Quantity, fields
 from rigtwin.numerics.arrays import Array
 
@@ -176,6 +176,10 @@ class Context:
         """Sizes of the component's motion."""
         return self.scales_of()
 
+    def component(self, *types: type[C]) -> C:
+        """Return the component that the effect changes, of one of these types."""
+        return component_of(self.plant, self.effect.group, *types)
+
     @property
     def nominal(self) -> float:
         """Magnitude of the effect in the plant: the value of its first parameter."""
@@ -293,8 +297,7 @@ class Effect:
 
     def nominal(self, plant: Plant) -> dict[str, float]:
         """Return the values of the effect's parameters in a plant, by name."""
-        component = getattr(plant, self.group)
-        return {name: float(getattr(component, name)) for name in self.kind.parameters}
+        return {name: parameter_of(plant, self.group, name) for name in self.kind.parameters}
 
     def distances(self, values: Sequence[float], plant: Plant) -> tuple[float, ...]:
         """Return the distances of an effect's magnitudes from their nominal values.

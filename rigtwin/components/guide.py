@@ -128,14 +128,13 @@ class Guide(NamedTuple):
     curve_half_range: Annotated[float, Quantity("m", 1e-9, 1e3, NONE)] = 1.0
 
 
-SHAPES = (
-    "stribeck_velocity",
-    "stribeck_exponent",
-    "cogging_pitch",
-    "cogging_phase",
-    *FRAME,
-)
+SHAPES = ("stribeck_velocity", "stribeck_exponent", "cogging_pitch", "cogging_phase", *FRAME)
 """Parameters of a guide that exert no force by themselves."""
+
+
+def acts(guide: Guide) -> bool:
+    """Return whether any parameter of a guide exerts a force."""
+    return any(value for name, value in guide._asdict().items() if name not in SHAPES)
 
 
 class Friction(NamedTuple):
@@ -153,7 +152,9 @@ class Friction(NamedTuple):
 
 def friction(component: Rail | Motor | Guide) -> Friction:
     """Return the dry friction of a rail, motor or guide."""
-    values = {name: float(getattr(component, name, 0.0)) for name in Friction._fields[1:]}
+    # A rail has no load-dependent friction, and a motor none of the guide's other parameters.
+    known = component._asdict()
+    values = {name: float(known.get(name, 0.0)) for name in Friction._fields[1:]}
     changing = any(v for name, v in values.items() if name not in CONSTANT)
     return Friction(changing, **values)
 
@@ -345,7 +346,7 @@ def position_force(guide: Guide, position: float, rest: float) -> float:
 
 def _rig_friction(context: Context) -> tuple[float, float]:
     """Return the nominal Coulomb friction and the unit of its changes, N."""
-    nominal = float(getattr(context.plant, context.effect.group).coulomb)
+    nominal = float(context.component(Rail, Motor).coulomb)
     return nominal, max(nominal, LEAST_FRICTION)
 
 

@@ -12,17 +12,12 @@ cogging_pitch, has several equilibria; one of them is returned. So has such a cu
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 from controllers.compiled import compilable
 from rigtwin.components.effect import Kind, around_nominal
-from rigtwin.components.guide import (
-    Friction,
-    Guide,
-    curve_size,
-    damping,
-    dry_limits,
-    position_force,
-    slide,
-)
+from rigtwin.components.guide import Guide, curve_size, damping, dry_limits, position_force, slide
+from rigtwin.components.guide_step import GuideStep
 
 MOST = 60
 """Largest number of search steps. None is needed where only dry friction is nonlinear."""
@@ -31,35 +26,25 @@ CLOSE, ROUNDED = 1e-9, 4e-16
 position (rounding)."""
 
 
+class MountState(NamedTuple):
+    """State of a guide behind its mount between two steps."""
+
+    inner: float  # Position of the guide, m.
+    speed: float  # Velocity of the guide in the step before, m/s.
+    slider: float  # Position of its friction element, m.
+    viscous: float  # Its viscous force, N.
+
+
 @compilable
 def resist_at(
-    guide: Guide,
-    spring: float,
-    rest: float,
-    share: float,
-    period: float,
-    inner: float,
-    slider: float,
-    viscous: float,
-    limits: tuple[float, float],
-    position: float,
+    guide_step: GuideStep, state: MountState, limits: tuple[float, float], position: float
 ) -> tuple[float, float, float]:
     """Return the force f(p) of a guide at a position p after a step.
 
     Parameters
     ----------
-    guide
-        Parameters of the guide.
-    spring
-        Stiffness in series with the dry friction, N/m.
-    rest
-        Position at which the guide's own spring is slack, m.
-    share
-        Share by which viscous friction relaxes in a step.
-    period
-        Length of the step, s.
-    inner, slider, viscous
-        Position of the guide, m, of its friction element, m, and viscous force, N, before the step.
+    guide_step, state
+        Guide, and its state before the step.
     limits
         Limits of the dry friction against positive and negative motion, N.
     position
@@ -70,38 +55,25 @@ def resist_at(
     tuple
         Force, N, motion of the friction element, m, and viscous force, N.
     """
-    v = (position - inner) / period
-    dry, by = slide(position - slider, 0.5 * guide.backlash, spring, limits[0], limits[1])
-    relaxed = viscous + share * (damping(guide, v) * v - viscous)
-    force = position_force(guide, position, rest) + dry + relaxed + guide.drag * v * abs(v)
-    return force, by, relaxed
+    guide, viscous = guide_step.guide, state.viscous
+    v = (position - state.inner) / guide_step.step
+    half = 0.5 * guide.backlash
+    dry, by = slide(position - state.slider, half, guide_step.spring, limits[0], limits[1])
+    relaxed = viscous + guide_step.share * (damping(guide, v) * v - viscous)
+    force = position_force(guide, position, guide_step.rest) + dry + relaxed
+    return force + guide.drag * v * abs(v), by, relaxed
 
 
 @compilable
 def give_way(
-    guide: Guide,
-    dry_friction: Friction,
-    spring: float,
-    rest: float,
-    share: float,
-    period: float,
-    inner: float,
-    speed: float,
-    slider: float,
-    viscous: float,
-    load: float,
-    outer: float,
-) -> tuple[float, float, float, float]:
+    guide_step: GuideStep, state: MountState, load: float, outer: float
+) -> tuple[MountState, float]:
     """Move a guide behind its mount, whose other end is at a given position.
 
     Parameters
     ----------
-    guide, spring, rest, share, period, inner, slider, viscous
-        Guide and its state, as in `resist_at`.
-    dry_friction
-        Dry friction of the guide.
-    speed
-        Velocity of the guide in the step before, m/s; it sets the limits of dry friction.
+    guide_step, state
+        Guide, and its state before the step. Its velocity sets the limits of dry friction.
     load
         Force that the guide transmits in addition, N.
     outer
@@ -110,45 +82,20 @@ def give_way(
     Returns
     -------
     tuple
-        Position of the guide, m, of its friction element, m, viscous force, N, and force on the
-        mount, N.
+        State of the guide after the step, and its force on the mount, N.
     """
-    # One function on purpose: it runs in every step, and its search would pass all of its dozen
-    # arguments on to a part of its own.
-    limits = dry_limits(dry_friction, speed, load)
+    guide = guide_step.guide
+    limits = dry_limits(guide_step.dry_friction, state.speed, load)
     compliance = guide.mount_compliance
-    position, slope = guess_position(
-        guide=guide,
-        spring=spring,
-        rest=rest,
-        share=share,
-        period=period,
-        inner=inner,
-        speed=speed,
-        slider=slider,
-        viscous=viscous,
-        limits=limits,
-        outer=outer,
-    )
-    force, by, relaxed = resist_at(
-        guide=guide,
-        spring=spring,
-        rest=rest,
-        share=share,
-        period=period,
-        inner=inner,
-        slider=slider,
-        viscous=viscous,
-        limits=limits,
-        position=position,
-    )
+    position, slope = guess_position(guide_step, state, limits, outer)
+    force, by, relaxed = resist_at(guide_step, state, limits, position)
     error = position + compliance * force - outer
     # The mismatch p + c·f(p) − x has a slope of at least 1, so the equilibrium is no further away
     # than the mismatch itself. Only cogging and a curve may fall with p, by twice their amplitudes
     # at most.
     waves = 2.0 * compliance * (guide.cogging + curve_size(guide))
     low, high = min(position, position - error) - waves, max(position, position - error) + waves
-    enough = CLOSE * abs(outer - inner) + ROUNDED * abs(outer)
+    enough = CLOSE * abs(outer - state.inner) + ROUNDED * abs(outer)
     halve = False
     for _ in range(MOST):
         if abs(error) <= enough:
@@ -161,55 +108,45 @@ def give_way(
         following = position - error / slope
         if halve or not low < following < high:
             following = 0.5 * (low + high)
-        force, by, relaxed = resist_at(
-            guide=guide,
-            spring=spring,
-            rest=rest,
-            share=share,
-            period=period,
-            inner=inner,
-            slider=slider,
-            viscous=viscous,
-            limits=limits,
-            position=following,
-        )
+        force, by, relaxed = resist_at(guide_step, state, limits, following)
         changed = following + compliance * force - outer
         if following != position:
             slope = max((changed - error) / (following - position), 1.0)
+        # A falling force can trap the secant on one side: bisect wherever it gains little.
         halve = waves > 0.0 and abs(changed) > 0.5 * abs(error)
         position, error = following, changed
-    return position, slider + by, relaxed, force
+    speed = (position - state.inner) / guide_step.step
+    return MountState(position, speed, state.slider + by, relaxed), force
 
 
 @compilable
 def guess_position(
-    guide: Guide,
-    spring: float,
-    rest: float,
-    share: float,
-    period: float,
-    inner: float,
-    speed: float,
-    slider: float,
-    viscous: float,
-    limits: tuple[float, float],
-    outer: float,
+    guide_step: GuideStep, state: MountState, limits: tuple[float, float], outer: float
 ) -> tuple[float, float]:
     """Return the equilibrium of guide and mount if only dry friction is nonlinear.
 
     Four cases are tried: the friction element slides forward, slides backward, lies within its
-    backlash, or sticks with its spring stretched. Arguments are those of `give_way`.
+    backlash, or sticks with its spring stretched.
+
+    Parameters
+    ----------
+    guide_step, state, limits
+        Guide, its state and the limits of its dry friction, as in `resist_at`.
+    outer
+        Position x of the mount's other end, m.
 
     Returns
     -------
     tuple
         Position of the guide, m, and slope of the mismatch p + c·f(p) − x in p.
     """
+    guide, spring, slider = guide_step.guide, guide_step.spring, state.slider
     compliance, half = guide.mount_compliance, 0.5 * guide.backlash
-    along = share * damping(guide, speed) / period
+    along = guide_step.share * damping(guide, state.speed) / guide_step.step
     rate = along + guide.stiffness
     # Force without dry friction, linear in the position: least + rate·position.
-    least = position_force(guide, inner, rest) + (1.0 - share) * viscous - rate * inner
+    least = position_force(guide, state.inner, guide_step.rest)
+    least = least + (1.0 - guide_step.share) * state.viscous - rate * state.inner
     slope = 1.0 + compliance * rate
     up = (outer - compliance * (least + limits[0])) / slope
     if up - slider >= half + limits[0] / spring:

@@ -13,6 +13,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from controllers.compiled import compilable
+from rigtwin.components.plant import Plant, component_of
 from rigtwin.components.quantity import NONE, Quantity
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
@@ -118,6 +119,11 @@ def measures(component: object) -> str:
     It is "" for a component that is not a sensor.
     """
     return MEASURES.get(type(component), "")
+
+
+def sensor_of(plant: Plant, name: str) -> Sensor:
+    """Return the sensor of a plant with a name."""
+    return component_of(plant, name, Lvdt, LoadCell, PositionSensor, VelocitySensor, ForceSensor)
 
 
 class Transducer(NamedTuple):

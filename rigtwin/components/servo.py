@@ -17,6 +17,7 @@ import numpy as np
 from controllers.compiled import compilable
 from rigtwin.components.actuators import ForceActuator
 from rigtwin.components.effect import Context, Kind, Starts, shares_of_nominal
+from rigtwin.components.plant import Plant, component_of
 from rigtwin.components.quantity import MJCF, NONE, UNLIMITED, Quantity
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
@@ -46,6 +47,11 @@ class Servo(NamedTuple):
 Pusher = ForceActuator | Servo
 PUSHERS = (ForceActuator, Servo)
 """Types of actuators that exert a force on a joint, whose motion follows from it."""
+
+
+def pusher_of(plant: Plant, name: str) -> Pusher:
+    """Return the force actuator or servo of a plant with a name."""
+    return component_of(plant, name, *PUSHERS)
 
 
 class Push(NamedTuple):

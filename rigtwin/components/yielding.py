@@ -7,6 +7,8 @@ together, so that a cylinder of any compliance is stable at any timestep.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 from controllers.compiled import compilable
 from rigtwin.components.cylinder import Cylinder
 from rigtwin.components.sensors import Lvdt, apply_sensor
@@ -44,60 +46,38 @@ def share_of_load(compliance: float, lag: float, timestep: float) -> float:
     return compliance / (lag + timestep)
 
 
-@compilable
-def yielding_rate(share: float, load: float, yielded: float, lag: float, timestep: float) -> float:
-    """Return the rate at which a plate yields, m/s.
+class Rod(NamedTuple):
+    """Motor rod on a plate that yields to its load, over one step.
 
-    Parameters
-    ----------
-    share
-        Rate per newton of load, m/(Ns), by `share_of_load`.
-    load
-        Load, N.
-    yielded
-        Displacement so far, m.
-    lag, timestep
-        Lag of the plate and length of the step, s.
+    The plate moves with w = free + share·load. At a velocity v of the carriage, the load is
+    force − viscous·(w − v) − F_dry(w − v).
     """
-    return share * load - yielded / (lag + timestep)
+
+    free: float  # Velocity of the plate without load, m/s.
+    share: float  # Velocity of the plate per newton of load, m/(Ns), above 0.
+    force: float  # Motor force without friction, N.
+    viscous: float  # Viscous friction of the motor, Ns/m.
+    forward: float  # Limit of the motor's dry friction against positive w − v, N.
+    backward: float  # Limit of the motor's dry friction against negative w − v, N.
 
 
 @compilable
-def rod_load(
-    v: float,
-    free: float,
-    share: float,
-    force: float,
-    viscous: float,
-    forward: float,
-    backward: float,
-) -> float:
-    """Return the rod's load on a yielding plate, N, at a velocity v of the carriage, m/s.
-
-    The plate moves with w = free + share·load, and load = force − viscous·(w − v) − F_dry(w − v).
-    Parameters are those of `solve_yielding`.
-    """
+def rod_load(rod: Rod, v: float) -> float:
+    """Return the rod's load on a yielding plate, N, at a velocity v of the carriage, m/s."""
     # Slide forward, slide backward, or stick with w = v.
-    sliding = free - v + share * force
-    if sliding > share * forward:
-        return force - forward - viscous * (sliding - share * forward) / (1.0 + share * viscous)
-    if sliding < -share * backward:
-        return force + backward - viscous * (sliding + share * backward) / (1.0 + share * viscous)
-    return (v - free) / share
+    share, force, viscous = rod.share, rod.force, rod.viscous
+    sliding = rod.free - v + share * force
+    if sliding > share * rod.forward:
+        drag = viscous * (sliding - share * rod.forward) / (1.0 + share * viscous)
+        return force - rod.forward - drag
+    if sliding < -share * rod.backward:
+        drag = viscous * (sliding + share * rod.backward) / (1.0 + share * viscous)
+        return force + rod.backward - drag
+    return (v - rod.free) / share
 
 
 @compilable
-def solve_sliding(
-    momentum: float,
-    inertia: float,
-    timestep: float,
-    free: float,
-    share: float,
-    force: float,
-    viscous: float,
-    forward: float,
-    backward: float,
-) -> float:
+def solve_sliding(rod: Rod, momentum: float, inertia: float, timestep: float) -> float:
     """Solve inertia·v + timestep·load(v) = momentum for the velocity of a sliding carriage, m/s.
 
     `momentum` contains the rail's friction impulse, Ns. The other parameters are those of
@@ -105,14 +85,15 @@ def solve_sliding(
     """
     # Below `slow` the plate runs ahead of the carriage, above `fast` behind it, and in between the
     # rod sticks.
-    slow, fast = free + share * (force - forward), free + share * (force + backward)
-    slope = viscous / (1.0 + share * viscous)
-    if inertia * slow + timestep * (force - forward) >= momentum:
-        return (momentum - timestep * (force - forward - slope * slow)) / (
+    free, share, force = rod.free, rod.share, rod.force
+    slow, fast = free + share * (force - rod.forward), free + share * (force + rod.backward)
+    slope = rod.viscous / (1.0 + share * rod.viscous)
+    if inertia * slow + timestep * (force - rod.forward) >= momentum:
+        return (momentum - timestep * (force - rod.forward - slope * slow)) / (
             inertia + timestep * slope
         )
-    if inertia * fast + timestep * (force + backward) <= momentum:
-        return (momentum - timestep * (force + backward - slope * fast)) / (
+    if inertia * fast + timestep * (force + rod.backward) <= momentum:
+        return (momentum - timestep * (force + rod.backward - slope * fast)) / (
             inertia + timestep * slope
         )
     return (momentum + timestep * free / share) / (inertia + timestep / share)
@@ -120,16 +101,7 @@ def solve_sliding(
 
 @compilable
 def solve_yielding(
-    rhs: float,
-    inertia: float,
-    timestep: float,
-    rail: tuple[float, float],
-    free: float,
-    share: float,
-    force: float,
-    viscous: float,
-    forward: float,
-    backward: float,
+    rod: Rod, rhs: float, inertia: float, timestep: float, rail: tuple[float, float]
 ) -> tuple[float, float]:
     """Solve for the carriage's velocity v and the load of a plate that yields to it.
 
@@ -138,6 +110,8 @@ def solve_yielding(
 
     Parameters
     ----------
+    rod
+        Rod between carriage and plate.
     rhs
         Momentum without the rod's force, Ns.
     inertia
@@ -146,16 +120,6 @@ def solve_yielding(
         Length of the step, s.
     rail
         Limits of the rail's friction impulse against positive and negative v, Ns.
-    free
-        Velocity of the plate without load, m/s.
-    share
-        Velocity of the plate per newton of load, m/(Ns), above 0.
-    force
-        Motor force without friction, N.
-    viscous
-        Viscous friction of the motor, Ns/m.
-    forward, backward
-        Limits of the motor's dry friction against positive and negative plate − v, N.
 
     Returns
     -------
@@ -163,50 +127,12 @@ def solve_yielding(
         Velocity v, m/s, and load, N.
     """
     # At rest, does the rail hold the carriage?
-    still = (
-        timestep
-        * rod_load(
-            v=0.0,
-            free=free,
-            share=share,
-            force=force,
-            viscous=viscous,
-            forward=forward,
-            backward=backward,
-        )
-        - rhs
-    )
+    still = timestep * rod_load(rod, 0.0) - rhs
     if still + rail[0] < 0.0:
         momentum = rhs - rail[0]
     elif still - rail[1] > 0.0:
         momentum = rhs + rail[1]
     else:
-        return 0.0, rod_load(
-            v=0.0,
-            free=free,
-            share=share,
-            force=force,
-            viscous=viscous,
-            forward=forward,
-            backward=backward,
-        )
-    v = solve_sliding(
-        momentum=momentum,
-        inertia=inertia,
-        timestep=timestep,
-        free=free,
-        share=share,
-        force=force,
-        viscous=viscous,
-        forward=forward,
-        backward=backward,
-    )
-    return v, rod_load(
-        v=v,
-        free=free,
-        share=share,
-        force=force,
-        viscous=viscous,
-        forward=forward,
-        backward=backward,
-    )
+        return 0.0, rod_load(rod, 0.0)
+    v = solve_sliding(rod, momentum, inertia, timestep)
+    return v, rod_load(rod, v)

@@ -54,6 +54,7 @@ def is_magnitude(force: Array, position: Array) -> bool:
     """
     for values in (force, -force):
         low, high = float(np.min(values)), float(np.max(values))
+        # A force with a sign crosses zero where the joint turns back; a magnitude only touches it.
         if high > 0.0 and low == 0.0 and _reversals(position) >= MAGNITUDE_REVERSALS:
             return True
     return False
@@ -65,8 +66,10 @@ def _reversals(position: Array) -> int:
     if step == 0.0:
         return 0
     count, extreme, up = 0, float(position[0]), True
+    # The loop runs in Python; 4000 samples are enough for the reversals of a test.
     for value in position[:: max(1, len(position) // 4000)]:
         value = float(value)
+        # Hysteresis of a tenth of the stroke: the noise of a resting joint is no reversal.
         if (value > extreme) == up and value != extreme:
             extreme = value
         elif abs(value - extreme) > step:
@@ -103,17 +106,20 @@ def motion_band(time: Array, positions: Mapping[str, Array]) -> float:
     from scipy.signal import welch  # Late: it takes a second.
 
     steps = np.diff(time)
+    # A log may repeat a time stamp. Such rows have no step.
     step = float(np.median(steps[steps > 0.0]))
     ticks = np.arange(time[0], time[-1], step)
     frequencies = []
     for values in positions.values():
         speed = np.gradient(np.interp(ticks, time, values), step)
+        # Segments of 4 s resolve 0.25 Hz, below the motions of a test.
         length = min(len(speed), max(int(4.0 / step), 8))
         frequency, power = welch(speed, 1.0 / step, nperseg=length)
         if np.sum(power) > 0.0:
             share = np.cumsum(power) / np.sum(power)
             frequencies.append(float(frequency[int(np.searchsorted(share, POWER))]))
     band = HARMONICS * float(np.median(frequencies)) if frequencies else HIGHEST_BAND
+    # Two digits: the description that this goes into is for people to edit.
     return float(f"{min(max(band, LOWEST_BAND), HIGHEST_BAND):.2g}")
 
 
@@ -147,12 +153,15 @@ def force_slopes(
     step = float(ticks[1] - ticks[0])
     if len(ticks) < 200 or step <= 0.0:
         return {}
+    # Zero-phase (forward and backward), or the filter's delay would look like friction. The corner
+    # is relative to the Nyquist frequency.
     smooth = butter(4, min(2.0 * CORNER * step, 0.9), output="sos")
     places, speeds, rates = {}, {}, {}
     for joint, values in positions.items():
         places[joint] = sosfiltfilt(smooth, np.interp(ticks, time, values))
         speeds[joint] = np.gradient(places[joint], step)
         rates[joint] = np.gradient(speeds[joint], step)
+    # Derivatives near the ends depend on how the filter pads the signal.
     rows = np.unique(np.linspace(EDGE * len(ticks), (1.0 - EDGE) * len(ticks), SAMPLES).astype(int))
     needed = _inverse(mechanism, places, speeds, rates, rows)
     slopes = {}
@@ -177,6 +186,8 @@ def _inverse(
     numbers = {joint: mechanism.number("joint", joint) for joint in places}
     needed: dict[str, Array] = {joint: np.zeros(len(rows)) for joint in places}
     flags = int(model.opt.disableflags)
+    # Measured forces contain no force of MuJoCo's contacts and limits, whose penetration a log
+    # cannot show.
     model.opt.disableflags = flags | int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
     try:
         for at, row in enumerate(rows):
@@ -198,12 +209,15 @@ def _regress(measured: Array, needed: Array, speed: Array) -> Slope | None:
     scale = float(np.std(speed))
     if scale == 0.0 or np.std(measured) == 0.0 or np.std(needed) == 0.0:
         return None
+    # tanh in place of the sign: a measured speed is never exactly zero. Both sides are freed of
+    # these columns, so the slope is that of the partial regression.
     friction = np.column_stack([np.tanh(speed / (0.1 * scale)), speed / scale, np.ones(len(speed))])
     residual, model = (
         values - friction @ np.linalg.lstsq(friction, values, rcond=None)[0]
         for values in (measured, needed)
     )
     power = float(model @ model)
+    # The columns of friction explain the model's force too: no slope can be told.
     if power <= 1e-12 * float(needed @ needed):
         return None
     slope = float(residual @ model) / power

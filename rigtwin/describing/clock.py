@@ -65,6 +65,7 @@ def find_clock(columns: Columns, stated: str = "") -> Clock:
         If no column, or more than one, can be the time, or if two units are possible.
     """
     try:
+        # A plain number is a period; anything else names a column.
         period = float(stated)
     except ValueError:
         pass
@@ -85,9 +86,12 @@ def find_clock(columns: Columns, stated: str = "") -> Clock:
     unit, why, assumed = _unit(column, unit, columns, steps)
     factor = unit_of(unit)[1]
     time = factor * columns.values[column]
+    # Rows that repeat a time stamp say nothing of the period.
     moving = np.concatenate([[True], np.diff(time) > 0.0])
     period = find_period(time[moving])
     uneven = np.abs(np.diff(time[moving]) - period) > JITTER * period
+    # Three digits: the median of a jittering clock is not exact, and the intended period is a round
+    # number.
     resample = float(f"{float(np.median(np.diff(time[moving]))):.3g}") if uneven.any() else None
     return Clock(column, unit, period, resample, why, assumed)
 
@@ -103,8 +107,10 @@ def _find_column(columns: Columns) -> str:
     for column, values in columns.values.items():
         words = split_words(column)
         telling = [word for word in words if word not in TIME_UNITS or word in TIME]
+        # "joint_s" has a unit of time for a word, but does not say that it is one.
         if telling and set(words) & TIME:
             if _rises(values):
+                # The fewest words win: "time" before "time_of_day".
                 named.append((len(telling), column))
             elif len(words) == len(telling) == 1:
                 falling.append(column)
@@ -119,6 +125,7 @@ def _find_column(columns: Columns) -> str:
         return named[0][1]
     steps = np.diff(columns.values[falling[0]]) if falling else np.zeros(0)
     if (steps < 0.0).any():
+        # Two: rows count from 1, and the step belongs to the row that it leads to.
         row = int(np.argmax(steps < 0.0)) + 2
         raise RigtwinError(
             f"time column {falling[0]!r} goes back in row {row}; several runs in one file? "
@@ -153,9 +160,11 @@ def _unit(column: str, unit: str, columns: Columns, step: float) -> tuple[str, s
         return unit, "as stated", False
     if column in columns.units:
         return columns.units[column], "unit as the file says", False
+    # A single word such as t or ms names the time rather than its unit.
     words = [word for word in split_words(column) if word in TIME_UNITS]
     if words and len(split_words(column)) > 1 and words[-1] != "sec":
         return TIME_UNITS[words[-1]], "unit by the column's name", False
+    # The bounds are a factor of 1500 apart, and the units 1000: two of them can fit.
     fits = [each for each in UNITS if FASTEST <= unit_of(each)[1] * step <= SLOWEST]
     if len(fits) == 1:
         seconds = unit_of(fits[0])[1] * step

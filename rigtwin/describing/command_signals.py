@@ -38,6 +38,7 @@ def position_command(log: Log, joint: str, position: Array) -> LogSignal | None:
         )
         return None
     source = log.slots.stated(joint, JointQuantity.COMMAND)
+    # The owner has stated all of it: nothing is left to conclude.
     if source is not None and (source.formula or source.unit):
         return log.stated_signal(joint, JointQuantity.COMMAND)
     try:
@@ -53,6 +54,8 @@ def position_command(log: Log, joint: str, position: Array) -> LogSignal | None:
         log.questions.append(str(question))
         return None
     assumed = [unit.assumed] if unit.assumed else []
+    # A position follows its command, late but in the same direction. Stated columns keep the sign
+    # that their owner gave.
     if source is None and follows(log.columns.values[column], position) < OPPOSED:
         sign = -1.0
         assumed.append("sign turned, as the position goes against it")
@@ -83,6 +86,7 @@ def force_command(log: Log, joint: str, measured: Collection[str]) -> LogSignal 
     for quantity in (JointQuantity.FORCE_COMMAND, JointQuantity.COMMAND):
         if log.slots.has(joint, quantity):
             return _control(log, joint, quantity)
+    # Without any command, the measured force itself is what pushes the model's joint.
     if joint in measured and (signal := force_signal(log, joint)) is not None:
         return replace(_as_control(log, signal), quantity=JointQuantity.FORCE_COMMAND)
     log.questions.append(
@@ -128,6 +132,8 @@ def _control(log: Log, joint: str, quantity: JointQuantity) -> LogSignal | None:
 def _as_control(log: Log, signal: LogSignal) -> LogSignal:
     """A force as the control that makes the actuator give it."""
     constant = actuator_constant(log.mechanism, actuator_on(log.mechanism, signal.joint) or "")
+    # The log holds a force, but the recording's channel is the control: force = gear · gain ·
+    # control.
     if constant in (0.0, 1.0) or signal.unit == "1" or signal.formula:
         return signal
     return replace(

@@ -100,6 +100,7 @@ def read_corrections(
         if key == TIME:
             time = text
             continue
+        # From the right: names of joints may contain dots.
         owner, dot, name = key.rpartition(".")
         if not dot or name not in KEYS:
             known = [TIME, *(f"JOINT.{each}" for each in KEYS)]
@@ -138,6 +139,8 @@ def _source(where: str, text: str, columns: Columns) -> Stated:
         return Stated("", "", "", 1.0)
     unit = ""
     body = text
+    # A column may itself end in brackets, as arrays do: q[3]. A number in brackets is therefore an
+    # index unless it is a unit.
     if body not in columns.values and (match := re.fullmatch(r"(.*\S)\s*\[([^\]]*)\]", body)):
         try:
             unit_of(match.group(2))
@@ -146,6 +149,7 @@ def _source(where: str, text: str, columns: Columns) -> Stated:
                 raise RigtwinError(f"{where}: unknown unit {match.group(2)!r}") from None
         else:
             body, unit = match.group(1), match.group(2).strip()
+    # A column whose name begins with a minus comes first.
     for sign, prefix in ((1.0, ""), (-1.0, "-")):
         bare = body.removeprefix(prefix).strip() if body.startswith(prefix) else ""
         if bare in columns.values:
@@ -156,6 +160,7 @@ def _source(where: str, text: str, columns: Columns) -> Stated:
         pass
     else:
         return Stated("", body, unit, 1.0)
+    # A formula names a column; without one, this is a column that is spelled wrong.
     if not any(name in body for name in columns.values):
         raise RigtwinError(f"{where}: no column {body!r}; {suggest(body, columns.values)}")
     return Stated("", body, unit, 1.0)

@@ -12,11 +12,7 @@ import numpy as np
 from rigtwin.describing.clock import find_clock
 from rigtwin.describing.matching import NUMBERED
 from rigtwin.describing.reading import Reading, read_log
-from rigtwin.describing.writer import (
-    table_rows,
-    write_description,
-    write_map,
-)
+from rigtwin.describing.writer import table_rows, write_description, write_map
 from rigtwin.description.bare import model_name, name_machine
 from rigtwin.description.document import examine_text
 from rigtwin.description.machine import Machine
@@ -71,6 +67,7 @@ class Described:
         lines.append(f"test of {self.reading.kind.test}: {self.reading.kind.why}")
         for signal in self.reading.signals:
             reasons = (signal.why,) if signal.why == NUMBERED else ()
+            # A match by number is an assumption. A match by name is not.
             if remarks := (*reasons, *signal.assumed):
                 lines.append(f"{signal.key} from {signal.source}: {'; '.join(remarks)}")
         return (*lines, *self.reading.notes)
@@ -91,6 +88,7 @@ class Described:
         """
         files = tuple(log) or self.log
         wanted, notes = parse(self.mapping, "map"), self.assumptions
+        # The map resamples as the first log needed it; another log may be even, or uneven, in time.
         if files != self.log:
             wanted, notes = self._resampled(wanted, files)
         imported = read_channels(files, wanted)
@@ -102,6 +100,7 @@ class Described:
             machine=self.machine.name,
             experiment=" ".join(path.stem for path in files),
             period=imported.period,
+            # Recordings begin at 0 s, and an uneven log was resampled to this grid.
             time=np.arange(len(imported.time)) * imported.period,
             columns=columns,
             controller={},
@@ -146,6 +145,8 @@ class Described:
                 raise RigtwinError(f"{path} exists; choose another folder, or remove it first")
             forbid_overwriting(path, self.machine.model, *self.log)
         model = os.path.relpath(self.machine.model, place)
+        # The description was written for a model beside it. In another folder, its path is
+        # relative.
         first = f"model = {_quote(self.machine.model.name)}"
         text = self.description.replace(first, f"model = {_quote(Path(model).as_posix())}", 1)
         atomic_write(paths[0], text)
@@ -204,6 +205,7 @@ def describe_log(
     try:
         reading = read_log(mechanism, columns, stated, test)
     except RigtwinError as error:
+        # A Question stays one: callers tell it from other errors by its type.
         raise type(error)(f"{said}: {error}") from None
     name = name_machine(model_name(mechanism), model.stem)
     description = write_description(mechanism, reading, name, model.name, said)

@@ -48,6 +48,7 @@ def force_signals(
             forces[joint] = signal
         else:
             still.append(joint)
+    # One logger writes all forces in one way, so they are judged together.
     if _are_magnitudes(log, forces, positions):
         names = [signal.column for signal in forces.values()]
         log.unused |= dict.fromkeys(names, "a magnitude without a sign, not the force")
@@ -109,6 +110,7 @@ def check_forces(
         Joint → position, SI, shape (rows,).
     """
     values = {s.joint: log.values(s) for s in signals if s.quantity is not JointQuantity.POSITION}
+    # A force of zero has no slope.
     values = {joint: each for joint, each in values.items() if np.any(each)}
     slopes = force_slopes(log.mechanism, log.time(), positions, values)
     return [
@@ -120,10 +122,7 @@ def check_forces(
 
 
 def suggest_forces(
-    log: Log,
-    joints: Sequence[str],
-    positions: Mapping[str, Array],
-    forces: Mapping[str, LogSignal],
+    log: Log, joints: Sequence[str], positions: Mapping[str, Array], forces: Mapping[str, LogSignal]
 ) -> None:
     """Ask whether currents, or columns without a meaning, are the forces that are missing.
 
@@ -141,12 +140,15 @@ def suggest_forces(
     lacking = [joint for joint in joints if joint not in forces]
     currents = {joint: log.slots.columns(joint, JointQuantity.CURRENT) for joint in lacking}
     offers = {joint: names for joint, names in currents.items() if names}
+    # With one joint, any column without a meaning could be its force; with several, the offers
+    # would be too many to judge.
     if len(joints) == 1 and lacking and not offers:
         offers = {joints[0]: [name for name, why in log.unused.items() if "fits no joint" in why]}
     unclear: list[tuple[str, str]] = []
     for joint, names in offers.items():
         for name in names[:SUGGESTED]:
             slope = _slope(log, joint, positions, log.columns.values[name])
+            # The slope is the number of units per newton, so its inverse converts the column.
             if slope is not None and slope.explained > SHOWN:
                 factor = f"{1.0 / slope.slope:.4g}"
                 unit = SI[JointQuantity.FORCE][log.mechanism.turns(joint)]
@@ -178,6 +180,7 @@ def _are_magnitudes(
     if not values or not all(is_magnitude(v, positions[j]) for j, v in values.items()):
         return False
     slopes = [_slope(log, joint, positions, each) for joint, each in values.items()]
+    # Inverse dynamics that explain a force show its sign, whatever its minimum is.
     return all(slope is None or slope.explained < SHOWN for slope in slopes)
 
 
@@ -198,8 +201,12 @@ def _check_force(log: Log, signal: LogSignal, slope: Slope) -> LogSignal:
     constant = 1.0
     if signal.quantity is not JointQuantity.FORCE:
         actuator = actuator_on(log.mechanism, signal.joint) or ""
+        # A command is in the actuator's unit: control times constant is the force that the model's
+        # is compared with.
         constant = actuator_constant(log.mechanism, actuator) or 1.0
     ratio = slope.slope * constant
+    # Friction and errors of the model change the slope by less than this; an unknown gear or unit
+    # by more.
     if not stated and not SLOPE_LOW < abs(ratio) < SLOPE_HIGH:
         question = ask(
             f"column {signal.column!r} is {abs(ratio):.3g} times the force that the model needs at "

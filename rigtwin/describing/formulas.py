@@ -50,11 +50,15 @@ def read_formula(text: str, columns: Iterable[str]) -> ColumnFormula:
     except ValueError:
         pass
     names: dict[str, str] = {}
+    # The longest names first, or q1 would be replaced within q12.
     for column in sorted(columns, key=len, reverse=True):
+        # Formulas of maps know plain names only.
         plain = re.sub(r"[^A-Za-z0-9]+", "_", column).strip("_") or "column"
         plain = plain if re.match(r"[A-Za-z]", plain) else f"c_{plain}"
+        # Different columns may have the same plain name, as a.b and a_b do.
         while names.get(plain, column) != column:
             plain += "_"
+        # Whole names only; a dot before or after would make it part of another column's name.
         replaced = re.sub(rf"(?<![\w.]){re.escape(column)}(?![\w.])", plain, text)
         if replaced != text or (plain == column and re.search(rf"\b{plain}\b", text)):
             names[plain] = column

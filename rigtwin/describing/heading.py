@@ -58,6 +58,7 @@ def split_words(name: str) -> tuple[str, ...]:
     name
         Name of a column, joint, actuator or sensor.
     """
+    # Spaces about the word: θ1 has the words theta and 1.
     for letter, word in GREEK.items():
         name = name.replace(letter, f" {word} ")
     name = re.sub(r"([a-z])([A-Z])", r"\1 \2", name)
@@ -76,6 +77,7 @@ def read_words(words: tuple[str, ...], unit: str) -> Meaning:
     """
     commanded = any(word in COMMANDED for word in words)
     quantity = None
+    # q_dot and theta dot are derivatives, although q and theta are positions.
     if "dot" in words:
         quantity = JointQuantity.VELOCITY
     elif "ddot" in words:
@@ -98,6 +100,7 @@ def stated_unit(words: tuple[str, ...]) -> str:
     words
         All words of the heading.
     """
+    # The unit stands last, as in position_deg.
     return next((UNIT_WORDS[word] for word in reversed(words) if word in UNIT_WORDS), "")
 
 

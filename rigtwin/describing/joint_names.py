@@ -65,8 +65,11 @@ def list_aliases(mechanism: Mechanism) -> list[Alias]:
             continue
         words = split_words(name)
         telling = tuple(word for word in words if word not in QUANTITY_WORDS | MEASURED | COMMANDED)
+        # A number alone names no joint: every numbered column would fit it.
         short = telling if any(not word.isdigit() for word in telling) else ()
         for form in (words, short):
             if form:
+                # The joint's own name comes first in the list, so an equal name of its sensor adds
+                # nothing.
                 aliases.setdefault((joint, form), Alias(joint, form, quantity, name))
     return list(aliases.values())

@@ -75,6 +75,8 @@ class Log:
             values = formula_values(formula, self.columns, period, signal.key)
         else:
             try:
+                # A command can be in the unit of an actuator's control, which is none of the known
+                # units.
                 factor = unit_of(signal.unit)[1]
             except RigtwinError:
                 factor = 1.0
@@ -82,6 +84,7 @@ class Log:
         known = np.isfinite(values)
         if not known.all() and known.any():
             rows = np.arange(len(values))
+            # The checks differentiate and filter: one missing cell would spoil the whole column.
             values = np.interp(rows, rows[known], values[known])
         return signal.sign * signal.scale * values
 

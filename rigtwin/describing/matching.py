@@ -78,6 +78,7 @@ def match_columns(
         elif named:
             owners = enumerate_names([match.joint for match in named])
             unused[column] = f"its name fits joints {owners} alike"
+        # Two numbers could be the joint and something else, such as a sample: no match.
         elif sum(word.isdigit() for word in words) == 1:
             numbered[column] = words
         elif len(joints) == 1 and (match := _alone(column, words, unit, joints[0])) is not None:
@@ -96,6 +97,7 @@ def match_columns(
 
 def _distinct(columns: Columns) -> list[str]:
     """Names of columns; of joined files that name a column twice, the longer name is left out."""
+    # Joined files share the array of a column that both hold, so its identity tells.
     names: dict[int, str] = {}
     for name, values in columns.values.items():
         known = names.get(id(values))
@@ -116,6 +118,7 @@ def _by_alias(
         exact = alias.words == words
         if at is None or (not exact and alias.quantity and set(alias.words) <= QUANTITY_WORDS):
             continue  # A sensor that is named "force" is meant by "force" alone.
+        # The rest of the heading says which quantity of that joint it is.
         meaning = read_words(words[:at] + words[at + len(alias.words) :], unit)
         quantity, why = meaning.quantity, f"named as {alias.name}"
         if exact and alias.quantity is not None and not meaning.commanded:
@@ -127,8 +130,10 @@ def _by_alias(
             if alias.quantity in (None, JointQuantity.COMMAND):
                 quantity = JointQuantity.POSITION
                 why += ", taken as the position"
+        # More unknown words than known ones: the joint's name stands in it by chance.
         if len(meaning.unknown) > len(alias.words):
             continue
+        # Fewer unknown words decide first, then the longer name: "left elbow" before "elbow".
         quality = (-len(meaning.unknown), len(alias.words), float(exact))
         rank = 2.0 + exact - 0.1 * len(meaning.unknown)
         match = Match(column, alias.joint, quantity, why, rank)
@@ -169,6 +174,8 @@ def _families(numbered: Mapping[str, tuple[str, ...]]) -> dict[str, list[str]]:
     """Columns whose names differ by a number only."""
     families: dict[str, list[str]] = {}
     for column in numbered:
+        # Only a whole family shows how its numbers count: from 0, from 1, or as the joints' names
+        # do.
         families.setdefault(re.sub(r"\d+", "#", column), []).append(column)
     return families
 
@@ -181,6 +188,7 @@ def _by_number(
 ) -> tuple[list[Match], str]:
     """Columns numbered in the order of the joints, or as the joints' own names are."""
     numbers = {column: _number(numbered[column]) for column in family}
+    # The family is numbered as a whole, so one column more or less than joints fits none.
     order = _order(sorted(numbers.values()), joints)
     first = family[0]
     rest = tuple(word for word in numbered[first] if not word.isdigit())
@@ -205,6 +213,7 @@ def _number(words: Sequence[str]) -> int:
 
 def _order(numbers: Sequence[int], joints: Sequence[str]) -> dict[int, str] | None:
     """Number of a column → joint; None if there are not as many joints."""
+    # Numbers in the joints' own names mean more than the order of the joints.
     digits = [[int(w) for w in split_words(joint) if w.isdigit()] for joint in joints]
     if all(len(each) == 1 for each in digits):
         by_name = {each[0]: joint for each, joint in zip(digits, joints, strict=True)}

@@ -58,6 +58,7 @@ def position_signals(log: Log, joints: Sequence[str]) -> dict[str, LogSignal] | 
                 log.questions.append(str(question))
                 continue
             matched[joint] = match.column, 1.0, match.why
+    # All at once: columns without a unit share one, and the widest range decides it.
     units = _units(log, {joint: column for joint, (column, _, _) in matched.items()})
     if units is None or len(signals) + len(matched) < len(joints):
         return None

@@ -100,6 +100,7 @@ def read_log(
     values = {joint: log.values(signal) for joint, signal in positions.items()}
     kind, movers = _choose_movers(log, test, list(positions.values()), values)
     signals = [*positions.values(), *movers]
+    # Only forces can be held against inverse dynamics.
     if kind.test in (INVERSE, FORCES):
         signals = check_forces(log, signals, values)
     if log.questions or log.clock is None:
@@ -131,6 +132,8 @@ def _choose_movers(
         kind = choose_kind(log.mechanism, log.slots, joints, list(forces), still, test)
     except Question as question:
         before = len(log.questions)
+        # A suggestion by the data is worth more than the general question, which follows where
+        # there is none.
         suggest_forces(log, joints, positions, forces)
         if len(log.questions) == before:
             log.questions.append(str(question))
@@ -156,6 +159,7 @@ def _open(
 ) -> tuple[Log, list[Match]]:
     """The log with its clock and the columns that it offers; a question can be open."""
     corrections = read_corrections(stated, mechanism, columns)
+    # The log is read on with an open question: all questions come at once.
     clock, questions = None, []
     try:
         clock = find_clock(columns, corrections.time)
@@ -170,6 +174,7 @@ def _open(
 
 def _all_questions(log: Log, signals: Sequence[LogSignal]) -> Question:
     """All open questions in one, with what was assumed so far."""
+    # Several joints can raise the same question.
     text = "; and ".join(dict.fromkeys(log.questions))
     assumed = [f"{s.key} from {s.column}, {s.assumed[0]}" for s in signals if s.assumed]
     return Question(f"{text}; assumed so far: {enumerate_names(assumed, 2)}" if assumed else text)
@@ -205,6 +210,7 @@ def _movers(
 
 def _band(log: Log, test: str, positions: Mapping[str, Array]) -> float | None:
     """Frequency up to which forces are judged, of joints that are replayed together."""
+    # Independent joints find their band on their own, by their inertia's share of the force.
     if test != INVERSE or not are_coupled(log.mechanism, list(positions)):
         return None
     band = motion_band(log.time(), positions)

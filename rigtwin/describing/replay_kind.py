@@ -8,14 +8,7 @@ from dataclasses import dataclass
 from rigtwin.describing.quantity import JointQuantity
 from rigtwin.describing.question import ask, enumerate_names, option
 from rigtwin.describing.slots import Slots
-from rigtwin.description.implied import (
-    FORCES,
-    INVERSE,
-    POSITIONS,
-    SERVOS,
-    TESTS,
-    actuator_on,
-)
+from rigtwin.description.implied import FORCES, INVERSE, POSITIONS, SERVOS, TESTS, actuator_on
 from rigtwin.description.mechanism import Mechanism
 from rigtwin.description.mistakes import suggest
 from rigtwin.errors import RigtwinError
@@ -74,9 +67,11 @@ def choose_kind(
         return ReplayKind(wanted, "as stated")
     positions = [j for j in joints if _takes_position(mechanism, j)]
     commanded = slots.joints(JointQuantity.COMMAND, joints)
+    # Measured forces come first: they need no model of the actuators.
     if len(measured) == len(joints):
         beside = " (position commands are there too: --test servos)" if commanded else ""
         return ReplayKind(INVERSE, f"the force at every joint was measured{beside}")
+    # Every command goes to an actuator that takes a position.
     if commanded and set(commanded) <= set(positions):
         return _position_test(mechanism, commanded)
     pushed = [
@@ -90,6 +85,7 @@ def choose_kind(
             or (joint in commanded and joint not in positions)
         )
     ]
+    # Joints without an actuator move freely; all others must be pushed by something known.
     if pushed and all(actuator_on(mechanism, j) is None or j in pushed for j in joints):
         if set(pushed) <= set(still):
             return ReplayKind(FORCES, "the force is 0 throughout: the joints swing freely")

@@ -34,6 +34,7 @@ class Slots:
         """
         self._columns, self._stated = columns, stated
         self._matches: dict[Slot, list[Match]] = {}
+        # A column that its owner assigned is not offered to another joint.
         used = {each.column for each in stated.slots.values() if each.column}
         for match in matches:
             if match.column not in used:
@@ -65,9 +66,11 @@ class Slots:
         offers = sorted(self._matches[joint, quantity], key=lambda candidate: -candidate.rank)
         offers = [candidate for candidate in offers if candidate.rank > offers[0].rank - TIE]
         if len(offers) > 1:
+            # Loggers often write a quantity twice, in SI and in another unit.
             plain = [candidate for candidate in offers if self._is_si(candidate.column, quantity)]
             offers = plain or offers
         values = [self._columns.values[candidate.column] for candidate in offers]
+        # Equal columns make no difference. NaN counts as equal: gaps of both are alike.
         if all(np.array_equal(values[0], candidate, equal_nan=True) for candidate in values[1:]):
             return offers[0]
         names = [candidate.column for candidate in offers]

@@ -109,6 +109,7 @@ def position_units(
         If two units are possible, or none.
     """
     units: dict[str, Unit] = {}
+    # Hinges and slides apart: one log can be in rad and mm.
     open_joints: dict[bool, list[str]] = {True: [], False: []}
     for joint, column in positions.items():
         turns = mechanism.turns(joint)
@@ -152,6 +153,7 @@ def command_unit(columns: Columns, column: str, position: Array, si: str, key: s
     stroke, followed = _stroke(columns.values[column]), _stroke(position)
     if stroke == 0.0 or followed == 0.0:
         return Unit(si, f"{si}, as nothing moves")
+    # SI first: strokes of 1 and 57.3 are a factor apart that no tracking error explains.
     for name in (si, small):
         if 1.0 / ALIKE < unit_of(name)[1] * stroke / followed < ALIKE:
             return Unit(name, f"{name} by the stroke of the position")
@@ -181,6 +183,7 @@ def _common_unit(
     largest = max(max(abs(low), abs(high)) for low, high in worst.values())
     answers = [option("*.position", f"[{unit}]") for unit in (si, small)]
     beyond = next((j for j in joints if not _within(mechanism, j, worst[j], 1.0, turns)), None)
+    # LeRobot writes "NAME.pos" as a share of the range, from −100 to 100: degrees look the same.
     percent = largest <= LARGEST_PERCENT and all(
         split_words(positions[j])[-1] == "pos" and "." in positions[j] for j in joints
     )
@@ -204,6 +207,8 @@ def _common_unit(
             answers[1],
             option(f"{beyond}.position", f"0.01745 * {column}"),
         )
+    # The turn, or the metres, that such a joint is held to are an assumption: near it, the owner is
+    # asked.
     if turns and not _limited(mechanism, beyond) and largest < SURELY_DEGREES:
         raise ask(f"{reach}, and joint {beyond} has no range; are these rad or degrees?", *answers)
     if not turns and not _limited(mechanism, beyond) and largest < SURELY_MILLIMETRES:
@@ -229,6 +234,7 @@ def _within(
         bottom, top = map(float, mechanism.model.jnt_range[mechanism.number("joint", joint)])
         slack = BEYOND * (top - bottom)
         return bottom - slack <= low and high <= top + slack
+    # Without a range, a hinge stays within a turn and a slide within metres.
     limit = WHOLE if turns else SURELY_METRES
     return max(abs(low), abs(high)) <= limit
 
@@ -256,4 +262,5 @@ def actuator_constant(mechanism: Mechanism, actuator: str) -> float:
     """Force of an actuator for each unit of its control, N or Nm."""
     number = mujoco.mj_name2id(mechanism.model, mujoco.mjtObj.mjOBJ_ACTUATOR, actuator)
     model = mechanism.model
+    # MuJoCo: force = gear · (gain · control + bias); a motor's bias is zero.
     return float(model.actuator_gear[number, 0]) * float(model.actuator_gainprm[number, 0])

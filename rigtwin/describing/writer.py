@@ -76,6 +76,8 @@ def write_description(
             f"band = {reading.band!r}            # Hz; above it forces are ripple or noise"
         )
     believed = [
+        # A command of zero shows nothing of its actuator; a stated factor is not to be estimated
+        # again.
         f"{actuator_name(mechanism, joint)} = {{ effects = [] }}    # its command is 0 throughout"
         for joint in reading.idle
     ]
@@ -189,6 +191,7 @@ def _source(signal: LogSignal, columns: Columns) -> tuple[str, dict[str, str]]:
 
 
 def _quote(text: str) -> str:
+    # JSON's strings are TOML's basic strings; letters with accents stay readable.
     return json.dumps(text, ensure_ascii=False)
 
 
@@ -211,5 +214,6 @@ def table_rows(mechanism: Mechanism, reading: Reading) -> list[Sequence[str]]:
         unit = "" if signal.formula else signal.unit
         channel = channel_of(mechanism, signal)
         rows.append((signal.key, signal.source, unit, channel, "; ".join(remarks)))
+    # Unused columns come last: a reader looks for a column that should have been used.
     rows += [("not used", column, "", "", why) for column, why in reading.unused.items()]
     return rows

@@ -51,6 +51,7 @@ def read_timing(model: mujoco.MjModel, number: int) -> dict[str, float]:
     if model.actuator_delay[number] > 0.0:
         timing["delay"] = float(model.actuator_delay[number])
     if int(model.actuator_dyntype[number]) in FILTERS:
+        # MuJoCo: act' = (ctrl − act)/τ with τ = dynprm₀.
         timing["lag"] = float(model.actuator_dynprm[number, 0])
     return timing
 
@@ -77,6 +78,7 @@ def rest_position(model: mujoco.MjModel, number: int) -> dict[str, float]:
     gear = float(model.actuator_gear[number, 0])
     if not lies_at_command(model, number) or gear == 0.0:
         return {}
+    # Solved for the joint's position; bias₁ is negative, as −kp.
     share, offset = -gain / float(bias[1]) / gear, -float(bias[0]) / float(bias[1]) / gear
     parameters = {} if np.isclose(share, 1.0) else {"gain": share}
     return parameters | ({} if offset == 0.0 else {"offset": offset})
@@ -99,6 +101,7 @@ def find_obstacle(model: mujoco.MjModel, number: int, kind: str) -> str | None:
     str or None
         Sentence with the property and the expected value; None if the component expresses all.
     """
+    # A channel of a recording holds one number.
     if model.actuator_ctrlnum[number] != 1:
         return f"it takes {model.actuator_ctrlnum[number]} commands; expected one"
     obstacle = _find_in_timing(model, number)
@@ -107,6 +110,8 @@ def find_obstacle(model: mujoco.MjModel, number: int, kind: str) -> str | None:
     # A position actuator prescribes its joint's position, so forces within it have no influence.
     if kind == "position actuator":
         return None
+    # Such parameters act at the actuator's length, behind the gear; those of the joint are
+    # components.
     for values, attribute in (
         (model.actuator_damping, "damping"),
         (model.actuator_armature, "armature"),

@@ -44,6 +44,7 @@ def check_value(key: str, value: object, meaning: Quantity | type[Choice]) -> fl
     RigtwinError
         If the value is not allowed. The message names the key and the allowed values.
     """
+    # Choices come as their label, in files and on the command line.
     if not isinstance(meaning, Quantity):
         try:
             return meaning.parse(str(value))
@@ -58,6 +59,7 @@ def check_value(key: str, value: object, meaning: Quantity | type[Choice]) -> fl
         )
     except (ValueError, OverflowError):
         number = math.nan
+    # The comparison is negated so that NaN fails it.
     if not (meaning.low <= number <= meaning.high):
         unit = "" if meaning.unit == "1" else f" {meaning.unit}"
         raise RigtwinError(
@@ -111,6 +113,7 @@ def override(
         if group_name in plant._fields:
             plant = plant._replace(**{group_name: group})
         else:
+            # Groups beside the plant are fields of the configuration itself.
             rest = rest._replace(**{group_name: group})
     return rest._replace(plant=plant)
 
@@ -141,6 +144,7 @@ def read_toml(path: Path, apply: Callable[[Mapping[str, Any]], Applied]) -> Appl
         return apply(parse_toml(path.read_text(encoding="utf-8-sig")))
     except OSError as error:
         raise RigtwinError(f"cannot read {path}: {error.strerror}") from None
+    # The parser recurses into nested arrays: a hostile file exhausts the stack.
     except (ValueError, RecursionError) as error:
         raise RigtwinError(f"{path} is not valid TOML: {error}") from None
     except RigtwinError as error:
@@ -277,6 +281,7 @@ def rebase(configuration: Configuration, base: Configuration) -> Configuration:
     for (key, value, _), (_, nominal, _) in zip(
         parameters(configuration), parameters(Configuration()), strict=True
     ):
+        # Only differences are carried over: the base may be calibrated in all else.
         if value != nominal:
             group, _, name = key.partition(".")
             changes.setdefault(group, {})[name] = (

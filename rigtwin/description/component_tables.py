@@ -124,6 +124,7 @@ class Components:
                 where, f"{name!r} cannot be a component's name; expected letters, digits and _"
             )
             return
+        # What the component stands for decides everything else, so reading ends without it.
         reference = self._find_element(where, table)
         if reference is None:
             return
@@ -137,11 +138,13 @@ class Components:
         self.values[name] = self._fill(
             name=name, where=where, kind=kind, table=table, element=element, mjcf=mjcf, joint=joint
         )
+        # A whole body moves with all joints before it, so it has no single coordinate.
         acts_on = () if kind in WHOLE else mechanism.acts_on(element, mjcf)
         turns = bool(acts_on) and all(mechanism.turns(hinge) for hinge, _ in acts_on)
         channel, unit = self._find_channel(name, where, kind, table, turns)
         self.by_name[name] = Component(
             name=name,
+            component_type=TYPES[kind],
             element=element,
             mjcf=mjcf,
             joint=joint,
@@ -179,11 +182,11 @@ class Components:
                 self.mistakes.note(where, f"{key} = {table[key]}: expected a text, in quotes")
             elif key != "unit" and not FIELD_NAME.fullmatch(str(table.get(key, name))):
                 self.mistakes.note(
-                    where,
-                    f"{key} = {table[key]!r}: expected letters without accents, digits and _",
+                    where, f"{key} = {table[key]!r}: expected letters without accents, digits and _"
                 )
         channel: tuple[str, str] | None = None
         if kind in SENSED:
+            # The MJCF decides m or rad, N or Nm: the unit is no free choice of the description.
             unit = UNITS[SENSED[kind]][turns]
             channel = ("/sensor", str(table.get("channel", name)))
             if table.get("unit", unit) != unit:
@@ -197,6 +200,7 @@ class Components:
             channel = ("/sensor", str(table.get("channel", name)))
         elif kind in MOVING:
             channel = ("/command", str(table.get("command", name)))
+            # Commands of positions are in SI; those of forces are in the actuator's own unit.
             if kind in ("position actuator", "servo", "cylinder"):
                 unit = UNITS["position"][turns]
         for key, fits in (("channel", kind in READ), ("command", kind in MOVING)):
@@ -207,6 +211,7 @@ class Components:
                     f"this is a {kind}",
                 )
         for earlier, known in self.by_name.items():
+            # Two actuators may take one command; two sensors cannot fill one channel.
             if channel is not None and known.channel == channel and kind in SENSED:
                 self.mistakes.note(
                     where,
@@ -259,6 +264,7 @@ class Components:
         """Return the kinds of effects that a component may have; None for all of its type."""
         if "effects" not in table:
             return None
+        # An empty list is allowed: no effect of the component is then searched for.
         possible = sorted({known.name for known in KINDS if TYPES[kind] in known.at})
         wanted = table["effects"]
         if not isinstance(wanted, list) or not all(isinstance(each, str) for each in wanted):
@@ -309,8 +315,10 @@ class Components:
                 self.mistakes.note(where, f"unknown key {key!r}; {suggest(key, known)}")
                 continue
             component = self._value(name, where, component, key, entry, meanings[key])
+        values = component._asdict()
         for key, meaning in meanings.items():
-            value = getattr(component, key)
+            value = values[key]
+            # Stated values were checked as they were read; those of the MJCF were not.
             if key not in table and not meaning.low <= value <= meaning.high:
                 self.mistakes.note(
                     where,
@@ -400,6 +408,7 @@ class Components:
             self.sources[f"{name}.{key}"] = str(table["source"])
         if "tolerance" in table:
             width = table["tolerance"]
+            # A text is a percentage of the nominal value, a number is in the parameter's unit.
             share = share_of(width) if isinstance(width, str) else None
             if share is not None and 0.0 < share <= 1.0:
                 self.tolerances.append(Tolerance(name, key, share, True))

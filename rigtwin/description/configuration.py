@@ -118,5 +118,6 @@ def flatten(configuration: Configuration) -> dict[str, dict[str, float | str]]:
 def parameters(configuration: Configuration) -> Iterator[tuple[str, Any, Quantity | type[Choice]]]:
     """Yield key, value and allowed values of every setting."""
     for name, group in groups(configuration).items():
+        values = group._asdict()
         for key, meaning in fields(type(group)).items():
-            yield f"{name}.{key}", getattr(group, key), meaning
+            yield f"{name}.{key}", values[key], meaning

@@ -159,12 +159,7 @@ class FormulaControl:
 
 @kernel
 def _replay(
-    controlling: Controller,
-    start: Array,
-    plate: Array,
-    sensors: Array,
-    demands: Array,
-    out: Array,
+    controlling: Controller, start: Array, plate: Array, sensors: Array, demands: Array, out: Array
 ) -> None:
     """Run the rig's controller over recorded ticks.
 

@@ -30,6 +30,7 @@ def are_coupled(mechanism: Mechanism, joints: Sequence[str]) -> bool:
     model = mechanism.model
     if len(joints) < 2:
         return False
+    # Any tendon counts, as its friction or stiffness acts on all joints that it passes.
     if model.ntendon or any(tie.joint in joints and tie.to in joints for tie in mechanism.ties()):
         return True
     # A coupling term can vanish at one pose by symmetry (a stretched arm), hence several random
@@ -81,6 +82,7 @@ def _load_moves(
     for index, number in enumerate(numbers):
         place = int(model.jnt_qposadr[number])
         original = float(data.qpos[place])
+        # 0.1 rad or m: large against rounding, small against the period of a sine.
         data.qpos[place] = original + 0.1
         mujoco.mj_forward(model, data)
         change = np.abs(data.qfrc_bias[list(at)] - before)

@@ -53,6 +53,7 @@ def examine(path: Path) -> tuple[Machine | None, list[str]]:
         Machine, or None if there are mistakes; and the mistakes.
     """
     try:
+        # Editors on Windows write a byte order mark, which utf-8-sig removes.
         text = path.read_text(encoding="utf-8-sig")
     except OSError as error:
         return None, [f"cannot read it: {error.strerror}"]
@@ -78,6 +79,7 @@ def examine_text(text: str, path: Path) -> tuple[Machine | None, list[str]]:
         return None, [f"it is not valid TOML: {error}"]
     reader = _Reader(path, document, mistakes)
     machine = reader.machine()
+    # A machine with a mistake in its tables is complete, but not what its author meant.
     return (None if mistakes else machine), list(mistakes)
 
 
@@ -151,12 +153,14 @@ class _Reader:
         name = str(about.get("name", ""))
         if "name" in about and not isinstance(about["name"], str):
             note("[machine] name", f"{name}: expected a text, in quotes")
+        # The name becomes part of file names and of topics in recordings.
         elif "name" in about and not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]*", name):
             note("[machine] name", f"{name!r}: expected letters, digits, - and _")
         nominal = about.get("nominal", "rough")
         if nominal not in PRIORS:
             note("[machine] nominal", f"{str(nominal)[:40]!r}: expected {' or '.join(PRIORS)}")
         if "form" in about:
+            # A share of the signal above a half would explain anything.
             self._mistakes.number("[machine] form", about["form"], 1e-6, 0.5)
         return about
 
@@ -166,8 +170,7 @@ class _Reader:
         if isinstance(tables, Mapping) and tables:
             return tables
         self._mistakes.note(
-            "",
-            "it has no [components.NAME]; expected at least what moves it and what is observed",
+            "", "it has no [components.NAME]; expected at least what moves it and what is observed"
         )
         return {}
 
@@ -190,6 +193,7 @@ class _Reader:
                 self._mistakes.note(where, "expected a table")
                 continue
             self._mistakes.unknown(where, table, ("summary", "duration", "period", "demands"))
+            # From a hundredth of a second to a day, and from 10 Hz to 10 kHz.
             for key, low, high in (("duration", 0.01, 86_400.0), ("period", 1e-4, 0.1)):
                 if key in table:
                     self._mistakes.number(f"{where} {key}", table[key], low, high)
@@ -205,6 +209,7 @@ class _Reader:
                 except ValueError as error:
                     self._mistakes.note(f"{where} demands.{channel}", str(error))
                     continue
+                # Demands are known before the test, so no signal of the test can be in them.
                 if set(inputs) - {"time"}:
                     self._mistakes.note(
                         f"{where} demands.{channel}", f"{text!r}: expected a formula of time alone"
@@ -229,6 +234,7 @@ class _Reader:
         """Return the path of the model: beside the description, or else a shipped one."""
         beside = self._path.parent / str(about.get("model", ""))
         shipped = Path(str(files("models"))) / "xml" / str(about.get("model", ""))
+        # A copied description finds the shipped model; a model beside it has priority.
         return shipped if not beside.is_file() and shipped.is_file() else beside
 
     def _mechanism(self, about: Mapping[str, Any]) -> Mechanism | None:
@@ -286,15 +292,18 @@ class _Reader:
                 f"no actuator takes the command {output!r}; {suggest(output, outputs)}",
             )
         try:
+            # A missing formula is noted above; 0 lets the reading go on.
             compiled: Formula = formula(str(table.get("formula", "0")), values)
         except ValueError as error:
             self._mistakes.note("[controller] formula", str(error))
             return None
+        # A constant command needs no controller, and its replay would judge nothing.
         if not compiled.inputs:
             self._mistakes.note(
                 "[controller] formula",
                 f"{compiled.text!r:.60} reads nothing; expected a sensor or a demand in it",
             )
+        # A setting that nothing reads is a spelling mistake in one of the two places.
         unused = [key for key in values if not re.search(rf"\b{re.escape(key)}\b", compiled.text)]
         if unused:
             self._mistakes.note("[controller] settings", f"{', '.join(unused)} not in the formula")
@@ -342,6 +351,7 @@ class _Reader:
                         f"{name} = {wanted!r}: expected /command.NAME or /sensor.NAME",
                     )
                 channels[name] = (topic, field)
+            # An actuator of that name is no input: its command would be its own cause.
             elif known is not None and known.channel is not None and known.element == "sensor":
                 channels[name] = known.channel
             else:

@@ -14,12 +14,10 @@ from rigtwin.description.coupling import are_coupled
 from rigtwin.description.mechanism import Mechanism
 from rigtwin.description.mistakes import Mistakes, suggest
 
-INVERSE, POSITIONS, SERVOS, FORCES = (
-    "inverse dynamics",
-    "position commands",
-    "servos",
-    "force commands",
-)
+INVERSE = "inverse dynamics"
+POSITIONS = "position commands"
+SERVOS = "servos"
+FORCES = "force commands"
 TESTS = {
     INVERSE: "the joints move as measured, and the forces that this takes are predicted",
     POSITIONS: "each joint follows its command, nominally at once, and its position is predicted",
@@ -95,6 +93,7 @@ def expand(
     for name, table in implied.components.items():
         changes = written.get(name, {})
         components[name] = {**table, **changes} if isinstance(changes, Mapping) else changes
+    # Components that no test implies, such as a base, are added as they are.
     components |= {name: table for name, table in written.items() if name not in components}
     return {**document, "components": components, "replays": implied.replays}
 
@@ -102,6 +101,7 @@ def expand(
 def movable_joints(mechanism: Mechanism) -> list[str]:
     """Return the names of the hinges and slides of a model, in the order of the model."""
     model = mechanism.model
+    # Free and ball joints have several coordinates, which no channel holds.
     single = (mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtJoint.mjJNT_HINGE)
     numbers = [n for n in range(model.njnt) if int(model.jnt_type[n]) in single]
     return [name for n in numbers if (name := mechanism.joint_name(n))]
@@ -172,6 +172,7 @@ def _expand_replay(
         if key in table:
             mistakes.note(where, f"{key} follows from test = {test!r}; leave one of them out")
             return
+    # Forces may leave joints without an actuator: they swing freely.
     missing = [j for j in joints if actuator_on(mechanism, j) is None]
     if test in (POSITIONS, SERVOS) and missing:
         mistakes.note(where, f"test = {test!r}: joint {missing[0]} has no position actuator")
@@ -184,6 +185,7 @@ def _expand_replay(
     together = test != POSITIONS and are_coupled(mechanism, joints)
     groups = [list(joints)] if together else [[joint] for joint in joints]
     for group in groups:
+        # One table becomes several replays, which need names of their own.
         group_keys = keys if len(groups) == 1 else {**keys, "name": identifier(group[0])}
         group_keys.setdefault("name", "all joints" if together else identifier(group[0]))
         _add_group(test, group, group_keys, mechanism, implied)
@@ -201,6 +203,7 @@ def _add_group(
         tables[name] = _sensor(mechanism, joint, "position") | {"effects": []}
     if test != POSITIONS:
         for joint in joints:
+            # Position commands hold the joint whatever resists, so its friction cannot be seen.
             tables[identifier(joint)] = {"joint": joint}
     if test == INVERSE:
         forces = [sensor_name(mechanism, joint, "force") for joint in joints]
@@ -208,6 +211,8 @@ def _add_group(
             tables[name] = _sensor(mechanism, joint, "force")
         if len(joints) > 1:
             for joint, name in zip(joints, forces, strict=True):
+                # Several joints: a short list keeps the number of explanations small enough to tell
+                # apart.
                 tables[identifier(joint)]["effects"] = PRESCRIBED
                 tables[name]["effects"] = ["gain"]
             _add_tendons(mechanism, joints, tables)
@@ -253,6 +258,7 @@ def _add_tendons(
 ) -> None:
     """Add the fixed tendons with friction that couples joints, such as those of a wrist."""
     for tendon in mechanism.names("tendon"):
+        # A tendon that passes another joint too would see a motion that is not measured.
         along = [joint for joint, _ in mechanism.acts_on("tendon", tendon)]
         if along and set(along) <= set(joints):
             tables[identifier(tendon)] = {"tendon": tendon, "effects": ["coulomb", "viscous"]}
@@ -287,6 +293,7 @@ def _body_of(mechanism: Mechanism, joint: str) -> str | None:
 def _add_mass(mechanism: Mechanism, joint: str, tables: dict[str, dict[str, Any]]) -> None:
     """Add the mass that moves with a joint that is replayed alone."""
     body = _body_of(mechanism, joint)
+    # A body with several joints moves with more than this one.
     if body and mechanism.joint_of("body", body) == joint:
         name = identifier(body)
         tables[f"{name}_mass" if name in tables else name] = {"body": body, "effects": ["mass"]}

@@ -189,7 +189,9 @@ def find_trip(machine: Machine, configuration: Configuration, columns: Columns) 
             (signal < limit.low, f"below {limit.low:g} {limit.unit}".rstrip()),
         ):
             if beyond.any():
+                # argmax of booleans is the first that is true.
                 trips.append(LimitTrip(int(np.argmax(beyond)), f"trip: {limit.name} {violation}"))
+    # Of limits that are passed at the same tick, the first of the description counts.
     return min(trips, key=lambda trip: trip.tick, default=None)
 
 
@@ -200,4 +202,5 @@ def largest_reach(machine: Machine, configuration: Configuration, columns: Colum
     """
     limited = limited_signals(machine, configuration, columns)
     shares = [limit.reach(signal) for limit, signal in limited]
+    # A diverged or missing sample has no share; `find_trip` reports it.
     return max((share for share in shares if math.isfinite(share)), default=0.0)

@@ -11,7 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from rigtwin.components import Effect, candidates
+from rigtwin.components.plant import select
 from rigtwin.components.quantity import Quantity
+from rigtwin.components.sensors import MEASURES
 from rigtwin.description.changes import override
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.control import Control
@@ -53,6 +55,8 @@ class Component:
     ----------
     name
         Name in the description.
+    component_type
+        Type of its parameters, such as `Guide`.
     element
         Kind of MJCF element that the component stands for, such as `joint`.
     mjcf
@@ -73,6 +77,7 @@ class Component:
     """
 
     name: str
+    component_type: type
     element: str
     mjcf: str
     joint: str
@@ -81,6 +86,11 @@ class Component:
     kinds: frozenset[str] | None = None
     acts_on: tuple[tuple[str, float], ...] = ()
     turns: bool = False
+
+    @property
+    def quantity(self) -> str:
+        """Quantity that a sensor measures, as a row's kind; empty for all other components."""
+        return MEASURES.get(self.component_type, "")
 
 
 @dataclass(frozen=True)
@@ -285,10 +295,11 @@ class Machine:
         start = self.configuration if base is None else base
         period = recording.period
         # The timestep divides the recording's period, and is at most the described one.
+        # The small number keeps a quotient of exactly n from becoming n + 1 by rounding.
         steps = max(1, math.ceil(period / start.timing.timestep - 1e-9))
         duration = max(recording.ticks * period, 0.01)
         changes: dict[str, dict[str, object]] = {
-            "timing": {"period": period, "duration": duration, "timestep": period / steps},
+            "timing": {"period": period, "duration": duration, "timestep": period / steps}
         }
         # Settings of another machine do not apply here. That the machines differ is reported by the
         # callers.
@@ -299,12 +310,17 @@ class Machine:
         for parameter, setting in self.parameter_settings.items():
             group, _, name = parameter.partition(".")
             # A base with a changed component has priority over the operator's note of its value.
-            if setting in recorded and getattr(start.plant, group) == getattr(self.plant, group):
+            unchanged = select(start.plant, [group]) == select(self.plant, [group])
+            if setting in recorded and unchanged:
                 changes.setdefault(group, {})[name] = recorded[setting]
         try:
             return override(start, changes)
         except RigtwinError as error:
             raise RigtwinError(f"{recording.path}: {error}") from None
+
+    def components_of(self, *types: type) -> list[Component]:
+        """Return the components of any of these types, in the order of the description."""
+        return [known for known in self.components.values() if known.component_type in types]
 
     @property
     def rows(self) -> tuple[Row, ...]:
@@ -335,6 +351,7 @@ class Machine:
             if (channel := self.components[mover].channel) and channel[0] == "/command"
         }
         for effect in candidates(self.plant):
+            # With one actuator the two delays would be the same effect under two names.
             if effect.group == "computer" and len(movers) < 2:
                 continue
             if effect.name in self.excluded:
@@ -392,6 +409,7 @@ class Machine:
         if "unit of the command" in unit:
             unit = unit.replace("unit of the command", component.unit or "1")
         unit, per, _ = unit.partition(PER_CHANNEL)
+        # Parameters are declared for slides; at a hinge the same number is in angular units.
         turned = TURNING.get(unit, unit) if component.turns else unit
         return f"{turned}/{component.unit}" if per and component.unit else turned
 

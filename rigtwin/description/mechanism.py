@@ -101,6 +101,8 @@ def compile_model(
         return mujoco.MjModel.from_xml_path(str(path))
     spec = mujoco.MjSpec.from_file(str(path))
     if urdf:
+        # URDFs often have links without inertia, such as frames of tools, which MuJoCo refuses
+        # where they move.
         spec.compiler.boundmass, spec.compiler.boundinertia = MASSLESS, MASSLESS**2
     if alter is not None:
         alter(spec)
@@ -125,6 +127,7 @@ class Mechanism:
         try:
             self.model = compile_model(path)
         except ValueError as error:
+            # MuJoCo's messages have several lines; ours have one.
             raise RigtwinError(f"model {path}: {' '.join(str(error).split())}") from None
         check_values(path, self.model)
 
@@ -166,6 +169,7 @@ class Mechanism:
             )
         if element == "actuator":
             through = int(model.actuator_trntype[number])
+            # For a hinge or slide, the frame of the parent makes no difference.
             if through in (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT):
                 return self.joint_name(int(model.actuator_trnid[number, 0]))
             return ""
@@ -212,10 +216,8 @@ class Mechanism:
     def force_per_command(self, name: str) -> tuple[float, float]:
         """Return a force actuator's force per command, and its limit, N or Nm (or infinite)."""
         number = self.number("actuator", name)
-        gear, gain = (
-            float(self.model.actuator_gear[number, 0]),
-            float(self.model.actuator_gainprm[number, 0]),
-        )
+        gear = float(self.model.actuator_gear[number, 0])
+        gain = float(self.model.actuator_gainprm[number, 0])
         # MuJoCo limits the force before the gear, so the limit at the joint is |gear| · forcerange.
         limit = np.inf
         if self.model.actuator_forcelimited[number]:
@@ -231,6 +233,8 @@ class Mechanism:
         model, number = self.model, self.number("actuator", name)
         gain, bias = float(model.actuator_gainprm[number, 0]), model.actuator_biasprm[number]
         affine = int(model.actuator_biastype[number]) == mujoco.mjtBias.mjBIAS_AFFINE
+        # kp enters MuJoCo's law twice, as gain and as −bias₁; only equal values make it an error
+        # times kp.
         proportional = np.isclose(bias[1], -gain) and gain != 0.0
         if not affine or not proportional or float(model.actuator_gear[number, 0]) != 1.0:
             return None
@@ -252,6 +256,7 @@ class Mechanism:
             return ((joint, 1.0),) if joint else ()
         first = int(model.tendon_adr[number])
         wraps = range(first, first + int(model.tendon_num[number]))
+        # A spatial tendon runs through sites, and its lever changes with the pose.
         if any(model.wrap_type[at] != mujoco.mjtWrap.mjWRAP_JOINT for at in wraps):
             return ()
         return tuple(
@@ -285,6 +290,8 @@ class Mechanism:
                 model.eq_type[number] != mujoco.mjtEq.mjEQ_JOINT
                 or not model.eq_active0[number]
                 or model.eq_obj2id[number] < 0
+                # Only linear equalities: a curved one would make the inertia depend on the
+                # coordinate.
                 or np.any(polynomial[2:])
             ):
                 continue
@@ -384,6 +391,7 @@ class Mechanism:
         mujoco.mj_fullM(model, data, full)
         low, high = (float(v) for v in model.jnt_range[number])
         if not model.jnt_limited[number]:
+            # Without limits: a whole turn, or 1 m to either side.
             low, high = (-TURN, TURN) if turns else (-1.0, 1.0)
         # At rest MuJoCo's bias force c(q, 0) is the gravity load alone.
         positions = np.linspace(low, high, GRID)
@@ -400,6 +408,7 @@ class Mechanism:
         return Joint(
             name=name,
             turns=turns,
+            # M_qq with all other joints at rest; the armature is part of MuJoCo's inertia matrix.
             inertia=float(full[at, at]),
             positions=where,
             gravity=gravity,

@@ -13,9 +13,9 @@ from xml.parsers import expat
 import mujoco
 import numpy as np
 
-from rigtwin.components import ForceActuator, Guide, Mass, Rail, Rotor, Servo
+from rigtwin.components import ForceActuator, Guide, Mass, Rail, Rotor, Servo, component_of
 from rigtwin.components.quantity import UNLIMITED
-from rigtwin.components.servo import PUSHERS
+from rigtwin.components.servo import PUSHERS, pusher_of
 from rigtwin.description.machine import Component, Machine
 from rigtwin.description.mechanism import Mechanism
 from rigtwin.errors import RigtwinError
@@ -226,8 +226,7 @@ def _apply(document: Document, machine: Machine, change: Change, changes: Sequen
     component = machine.components.get(change.component)
     if component is None:
         return False
-    nominal = getattr(machine.plant, change.component)
-    attribute = ATTRIBUTES.get(type(nominal), {}).get(change.parameter)
+    attribute = ATTRIBUTES.get(component.component_type, {}).get(change.parameter)
     if attribute is not None and component.element in PARENTS:
         tag = document.find(component.element, component.mjcf)
         if component.element == "actuator" and (
@@ -237,8 +236,10 @@ def _apply(document: Document, machine: Machine, change: Change, changes: Sequen
             return False
         document.set(tag, attribute, _number(change.value))
         return True
-    if isinstance(nominal, Mass) and change.parameter == "mass" and nominal.mass > 0.0:
-        return _scale_mass(document, component, change.value / nominal.mass)
+    if component.component_type is Mass and change.parameter == "mass":
+        nominal = component_of(machine.plant, component.name, Mass).mass
+        # A body may consist of geoms without a mass of their own: all of them are scaled alike.
+        return nominal > 0.0 and _scale_mass(document, component, change.value / nominal)
     if component.element == "actuator":
         return _apply_to_actuator(document, machine, component, change, changes)
     return False
@@ -252,19 +253,19 @@ def _apply_to_actuator(
     changes: Sequence[Change],
 ) -> bool:
     """Set the attribute of an actuator's parameter. Return whether MJCF has such an attribute."""
-    nominal = getattr(machine.plant, change.component)
     compiled = Mechanism(machine.model)
     model, number = compiled.model, compiled.number("actuator", component.mjcf)
     tag = document.find("actuator", component.mjcf)
-    pushes = isinstance(nominal, ForceActuator)
+    of = component.component_type
     if change.parameter == "delay":
         _set_delay(document, tag, model, number, change.value)
-    elif change.parameter == "lag" and isinstance(nominal, Servo) and tag.name == "position":
+    elif change.parameter == "lag" and of is Servo and tag.name == "position":
         document.set(tag, "timeconst", _number(change.value))
-    elif change.parameter == "lag" and isinstance(nominal, PUSHERS) and tag.name == "general":
+    elif change.parameter == "lag" and of in PUSHERS and tag.name == "general":
         document.set(tag, "dyntype", "filterexact" if change.value > 0.0 else "none")
         document.set(tag, "dynprm", _number(change.value))
-    elif change.parameter in ("gain", "force_limit") and pushes:
+    elif change.parameter in ("gain", "force_limit") and of is ForceActuator:
+        nominal = pusher_of(machine.plant, component.name)
         values = {
             other.parameter: other.value for other in changes if other.component == component.name
         }
@@ -277,7 +278,7 @@ def _apply_to_actuator(
         # joint, so forcerange is divided by the new gear.
         limit = values.get("force_limit", nominal.force_limit)
         _set_force_limit(document, tag, limit / abs(float(gear[0])), limit)
-    elif change.parameter == "force_limit" and isinstance(nominal, Servo):
+    elif change.parameter == "force_limit" and of is Servo:
         _set_force_limit(document, tag, change.value, change.value)
     else:
         return False

@@ -183,11 +183,13 @@ def check_values(path: Path, model: mujoco.MjModel) -> None:
     model
         Compiled MJCF.
     """
+    # Inertia matrices are dense here: n² numbers, and n³ operations a step.
     if model.nv > MOST_DEGREES:
         raise RigtwinError(
             f"model {path}: it has {model.nv} degrees of freedom; expected at most {MOST_DEGREES}"
         )
-    for name, values in _arrays(model):
+    arrays = dict(_arrays(model))
+    for name, values in arrays.items():
         # An infinite end of a range means that there is no limit.
         wrong = np.isnan(values) if name.endswith("range") else ~np.isfinite(values)
         if wrong.any():
@@ -197,7 +199,7 @@ def check_values(path: Path, model: mujoco.MjModel) -> None:
                 "expected a finite number"
             )
     for limits, attribute in RANGES.items():
-        pairs = getattr(model, limits)
+        pairs = arrays[limits]
         # A range of 0 0 is MuJoCo's default, which stands for no range.
         wrong = np.flatnonzero(pairs.any(axis=1) & ~(pairs[:, 0] < pairs[:, 1]))
         if len(wrong):
@@ -207,7 +209,7 @@ def check_values(path: Path, model: mujoco.MjModel) -> None:
                 f"{low:g} {high:g}; expected the lower end first"
             )
     for name, attribute in NOT_NEGATIVE.items():
-        values = np.atleast_1d(getattr(model, name))
+        values = arrays[name]
         if (values < 0.0).any():
             place = tuple(int(at) for at in np.argwhere(values < 0.0)[0])
             raise RigtwinError(
@@ -218,6 +220,8 @@ def check_values(path: Path, model: mujoco.MjModel) -> None:
 
 def _arrays(model: mujoco.MjModel) -> Iterator[tuple[str, np.ndarray]]:
     """Yield name and values of every floating-point option and array of a model."""
+    # The bindings list their arrays as attributes only; a list of names would miss those of new
+    # versions.
     for holder, prefix in ((model.opt, "option "), (model, "")):
         for name in dir(holder):
             value = None if name.startswith("_") else getattr(holder, name, None)

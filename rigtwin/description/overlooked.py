@@ -88,6 +88,7 @@ def _joints(
             if name not in moved | tied:
                 yield f"joint {name}: no replay moves it, so it stays where it is"
             if model.jnt_limited[number]:
+                # Contacts with the stops are constraints, which all models leave out.
                 yield f"joint {name}: the stops at the ends of its range"
 
 
@@ -97,6 +98,7 @@ def _dissipation(model: mujoco.MjModel, components: Mapping[str, Component]) -> 
     MuJoCo treats dry friction as a constraint, so that inverse dynamics without constraints leave
     it out. Components model it instead.
     """
+    # Sensors and actuators have channels; what is left are guides, rotors and masses.
     described = {(part.element, part.mjcf) for part in components.values() if part.channel is None}
     for number in range(model.njnt):
         name = _name(model, mujoco.mjtObj.mjOBJ_JOINT, number)
@@ -133,5 +135,6 @@ def _actuators(model: mujoco.MjModel, components: Mapping[str, Component]) -> It
         if name not in described and pushes:
             yield f"actuator {name}: it is no component, so the force that it has without a command"
         low, high = model.actuator_forcerange[number]
+        # A force limit is one number here, the upper end for both directions.
         if model.actuator_forcelimited[number] and not np.isclose(low, -high):
             yield f"actuator {name}: its forcerange's lower end {low:g}; taken as {-high:g}"

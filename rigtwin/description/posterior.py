@@ -97,7 +97,7 @@ class Posterior:
 def value_of(configuration: Configuration, key: str) -> float:
     """Return the value of a setting. key: `group.name`."""
     group, _, name = key.partition(".")
-    return float(getattr(groups(configuration)[group], name))
+    return float(groups(configuration)[group]._asdict()[name])
 
 
 def shift_within(configuration: Configuration, key: str, amount: float) -> Configuration:
@@ -202,6 +202,7 @@ def _parse(tables: Mapping[str, Any], nominal: Configuration) -> Posterior:
 
 def _with(nominal: Configuration, where: str, changes: Changes) -> Configuration:
     """Return a configuration with changes, which may concern components alone."""
+    # The same checks as for any other file: bounds, names and types.
     configuration = override(nominal, changes)
     for group in changes:
         if group not in configuration.plant._fields:
@@ -214,6 +215,7 @@ def _with(nominal: Configuration, where: str, changes: Changes) -> Configuration
 
 def _probability(value: object) -> float:
     """Return a probability; raise RigtwinError for any other value."""
+    # bool is an int in Python, but true is no probability.
     if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 <= value <= 1.0:
         raise RigtwinError(f"{POSTERIOR}: probability = {value!r}; expected 0 to 1")
     return float(value)
@@ -222,11 +224,8 @@ def _probability(value: object) -> float:
 def _interval(configuration: Configuration, key: str, ends: object) -> tuple[float, float]:
     """Return the interval of a parameter, which must contain the parameter's value."""
     group, _, name = key.partition(".")
-    known = (
-        fields(type(getattr(configuration.plant, group)))
-        if group in configuration.plant._fields
-        else {}
-    )
+    components = configuration.plant._asdict()
+    known = fields(type(components[group])) if group in components else {}
     if not isinstance(known.get(name), Quantity):
         raise RigtwinError(
             f"{POSTERIOR}.intervals: unknown parameter {key!r}; "

@@ -31,12 +31,10 @@ class Replays:
         control: Control | None,
         mistakes: Mistakes,
     ) -> None:
-        self._mechanism, self._components, self._control, self._mistakes = (
-            mechanism,
-            components,
-            control,
-            mistakes,
-        )
+        self._mechanism = mechanism
+        self._components = components
+        self._control = control
+        self._mistakes = mistakes
 
     def read(self, tables: object) -> tuple[ReplayOf, ...]:
         """Return the replays without mistakes; note the mistakes of the rest.
@@ -82,6 +80,7 @@ class Replays:
         if len(self._mistakes) > before:
             return None
         name = str(table.get("name", f"replay {number}"))
+        # Several movers, or free joints, make one replay of joints that act on each other.
         coupled = "free" in table or len(movers) > 1
         if coupled and not self._components.physics().replayed_whole:
             joined = JoinedReplays(self._mechanism, self._components, self._mistakes)
@@ -183,8 +182,7 @@ class Replays:
             ]
             if len(names) > 1:
                 self._mistakes.note(
-                    where,
-                    f"joint {joint} has {len(names)} components of type {kind}; expected one",
+                    where, f"joint {joint} has {len(names)} components of type {kind}; expected one"
                 )
             parts[kind] = names[0] if names else None
         return parts
@@ -218,6 +216,7 @@ class Replays:
                 f"[[replays]] {together[0].name}",
                 "its joints act on each other; expected no replay beside it",
             )
+        # A tendon's force depends on several joints, of which a single replay knows one.
         if not together and any(
             component.element == "tendon" for component in self._components.by_name.values()
         ):
@@ -237,6 +236,7 @@ class Replays:
     def _closes(self, mover: str) -> bool:
         """Return whether the described controller commands a component, so that it is simulated."""
         control, channel = self._control, self._components.by_name[mover].channel
+        # Python controllers are replayed on their own, from recorded inputs.
         return isinstance(control, FormulaControl) and channel == ("/command", control.output)
 
     def _read_observed(self, where: str, table: Mapping[str, Any]) -> list[str]:
@@ -265,6 +265,7 @@ class Replays:
             and self._components.types[name] in SENSED
             and known.channel is not None
         ):
+            # Its measured motion is the input: predicting it would be a comparison with itself.
             if name in movers:
                 self._mistakes.note(
                     where, f"{name} moves the joint, so it cannot be observed there too"

@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from rigtwin.components.plant import P, Plant
+from rigtwin.components.plant import P, Plant, parameter_of, with_parameters
 
 MECHANICAL = ("mass", "stiffness", "constant", "coulomb", "viscous")
 """Parameters that change the motion itself, and not only its measurement."""
@@ -52,17 +52,13 @@ class Tolerance:
         """
         if self.ticks:
             return min(self.half_width * period, self.longest)
-        return self.half_width * (
-            abs(float(getattr(getattr(plant, self.group), self.parameter)))
-            if self.relative
-            else 1.0
-        )
+        nominal = parameter_of(plant, self.group, self.parameter) if self.relative else 1.0
+        return self.half_width * abs(nominal)
 
     def shift(self, plant: P, amount: float) -> P:
         """Return a plant with the parameter increased by an amount, in the parameter's unit."""
-        group = getattr(plant, self.group)
-        value = float(getattr(group, self.parameter)) + amount
-        return plant._replace(**{self.group: group._replace(**{self.parameter: value})})
+        value = parameter_of(plant, self.group, self.parameter) + amount
+        return with_parameters(plant, self.group, {self.parameter: value})
 
     @property
     def mechanical(self) -> bool:

@@ -13,7 +13,7 @@ import numpy as np
 
 from rigtwin.components import Body, Guide, Rotor
 from rigtwin.components.body import INERTIAL
-from rigtwin.description.machine import Component, Machine
+from rigtwin.description.machine import Machine
 from rigtwin.models.rigid import RigidBodies
 from rigtwin.numerics.arrays import Array
 
@@ -43,12 +43,10 @@ def find_base_parameters(machine: Machine) -> tuple[Mapping[str, float], ...]:
         `component.name`, with the names of `INERTIAL`, or `inertia` of a rotor. A parameter in no
         sum cannot be identified. Empty for other machines.
     """
-    plant, components = machine.plant, machine.components
-    at: dict[type, list[Component]] = {Body: [], Rotor: [], Guide: []}
-    for component in components.values():
-        at.get(type(getattr(plant, component.name)), []).append(component)
-    if not at[Body]:
+    heavy, rotors = machine.components_of(Body), machine.components_of(Rotor)
+    if not heavy:
         return ()
+    components = machine.components
     (replay,) = machine.replays
     joints = [components[name].joint for name in replay.moved_by]
     rows = [joints.index(components[row.name].joint) for row in replay.rows]
@@ -56,16 +54,16 @@ def find_base_parameters(machine: Machine) -> tuple[Mapping[str, float], ...]:
     # the machine could reach.
     random = np.random.default_rng(SEED)
     motion = random.standard_normal((3, len(joints), STATES)) * np.reshape(SPREAD, (3, 1, 1))
-    bodies = RigidBodies(machine.model, joints, at[Guide], at[Rotor])
+    bodies = RigidBodies(machine.model, joints, machine.components_of(Guide), rotors)
     columns: dict[str, Array] = {}
     # A rotor adds its inertia times the acceleration of its shaft, which the ratios in `acts_on`
     # map to and from the joints.
-    for rotor in at[Rotor]:
+    for rotor in rotors:
         along = np.array([dict(rotor.acts_on).get(joint, 0.0) for joint in joints])
         columns[f"{rotor.name}.inertia"] = np.outer(along, along @ motion[2])[rows].ravel()
     # Rotors first, then bodies from the base outwards: a dependent parameter of an outer body is
     # added to those of inner bodies.
-    for body in at[Body]:
+    for body in heavy:
         regressor = bodies.regressor(motion, body.mjcf)[:, rows].reshape(len(INERTIAL), -1)
         columns |= {
             f"{body.name}.{word}": each for word, each in zip(INERTIAL, regressor, strict=True)

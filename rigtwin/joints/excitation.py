@@ -7,9 +7,9 @@ from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
-from rigtwin.components import ForceActuator
+from rigtwin.components import ForceActuator, component_of
 from rigtwin.description.configuration import Configuration
-from rigtwin.description.machine import Joint, Machine
+from rigtwin.description.machine import Component, Joint, Machine
 from rigtwin.description.mechanism import Mechanism
 from rigtwin.errors import RigtwinError
 from rigtwin.models.demands import demanded_channels
@@ -33,9 +33,7 @@ Reach = tuple[float, float]
 
 
 def excite(
-    machine: Machine,
-    reach: Callable[[Machine, tuple[str, str]], Reach | None],
-    least_period: float,
+    machine: Machine, reach: Callable[[Machine, tuple[str, str]], Reach | None], least_period: float
 ) -> Iterator[Recording]:
     """Yield recordings of multisines, without limits; none where a range is unknown.
 
@@ -119,10 +117,7 @@ def reach_of_component(machine: Machine, channel: tuple[str, str]) -> Reach | No
         # The description does not say how far a controller's other inputs go.
         return None
     joint = Mechanism(machine.model).joint(moved.joint or moved.acts_on[0][0])
-    actuator = getattr(machine.plant, moved.name)
-    if not isinstance(actuator, ForceActuator):
-        return _range(joint)
-    return 0.0, _gentle_force(joint) / actuator.constant
+    return _reach(machine, moved, joint)
 
 
 def reach_of_replay(machine: Machine, channel: tuple[str, str]) -> Reach | None:
@@ -130,11 +125,18 @@ def reach_of_replay(machine: Machine, channel: tuple[str, str]) -> Reach | None:
     for replay in machine.replays:
         joint, mover = replay.joint, machine.components[replay.moved_by[0]]
         if channel == mover.channel:
-            constant = getattr(getattr(machine.plant, mover.name), "constant", None)
-            return _range(joint) if constant is None else (0.0, _gentle_force(joint) / constant)
+            return _reach(machine, mover, joint)
         if replay.closed:
             return _range(joint)
     return None
+
+
+def _reach(machine: Machine, mover: Component, joint: Joint) -> Reach:
+    """Return the range of the command of a force actuator, or of a joint's position."""
+    if mover.component_type is not ForceActuator:
+        return _range(joint)
+    constant = component_of(machine.plant, mover.name, ForceActuator).constant
+    return 0.0, _gentle_force(joint) / constant
 
 
 def _gentle_force(joint: Joint) -> float:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from rigtwin.components import PositionActuator, measures
+from rigtwin.components import PositionActuator
 from rigtwin.description.machine import Component, Machine
 from rigtwin.numerics.arrays import Array
 
@@ -33,20 +33,20 @@ def joint_positions(
     """
     positions: dict[str, Array] = {}
     for wanted in ("position", "command", "velocity"):
-        for name, component in machine.components.items():
-            part = getattr(machine.plant, name)
-            quantity = "command" if isinstance(part, PositionActuator) else measures(part)
+        for component in machine.components.values():
+            positioned = component.component_type is PositionActuator
+            quantity = "command" if positioned else component.quantity
             signal = _find_signal(component, columns)
             if quantity != wanted or signal is None or component.joint in ("", *positions):
                 continue
             # The mean velocity is an offset of the sensor and would integrate to a drift.
             summed = np.cumsum(signal - np.mean(signal)) * period
             positions[component.joint] = summed if wanted == "velocity" else signal
-    for name, component in machine.components.items():
+    for component in machine.components.values():
         # A sensor of a sum of joints gives the one unknown joint among them.
         signal = _find_signal(component, columns)
         unknown = [(joint, share) for joint, share in component.acts_on if joint not in positions]
-        if measures(getattr(machine.plant, name)) == "position" and len(unknown) == 1:
+        if component.quantity == "position" and len(unknown) == 1:
             known = [
                 share * positions[joint] for joint, share in component.acts_on if joint in positions
             ]

@@ -10,7 +10,7 @@ import numpy as np
 
 from controllers.formula import run
 from rigtwin.components.plant import Plant
-from rigtwin.components.sensors import start_transducer, transduce, transducer
+from rigtwin.components.sensors import sensor_of, start_transducer, transduce, transducer
 from rigtwin.description.control import Channel, FormulaControl
 from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
@@ -60,8 +60,9 @@ class Readings:
         self.signals = {name: np.zeros(ticks) for name in names}
         """Sensor → readings up to the current tick, zero after it, shape (ticks,)."""
         self._noise = noise
-        self._bits = {name: getattr(plant, name).resolution for name in names}
-        self._models = {name: transducer(getattr(plant, name), period) for name in names}
+        sensors = {name: sensor_of(plant, name) for name in names}
+        self._bits = {name: sensor.resolution for name, sensor in sensors.items()}
+        self._models = {name: transducer(sensor, period) for name, sensor in sensors.items()}
         self._states = {name: start_transducer(each) for name, each in self._models.items()}
 
     def take(self, tick: int, true: Mapping[str, float]) -> dict[str, float]:
@@ -78,6 +79,8 @@ class Readings:
         for name, model in self._models.items():
             value = transduce(model, self._states[name], true[name])
             if name in self._noise:
+                # Noise before rounding, as in the recording: the controller acts on what is
+                # recorded.
                 value += float(self._noise[name][tick])
             bit = self._bits[name]
             readings[name] = self.signals[name][tick] = round(value / bit) * bit if bit else value

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from rigtwin.components import PUSHERS, measures
+from rigtwin.components import PUSHERS
 from rigtwin.description.control import Channel
 from rigtwin.description.machine import Machine
 from rigtwin.errors import RigtwinError
@@ -51,8 +51,8 @@ def list_pushers(machine: Machine) -> dict[str, Channel]:
 
     A controller can command these tick by tick. Prescribed motions are known before the test.
     """
-    movers = list_movers(machine).items()
-    return {name: c for name, c in movers if isinstance(getattr(machine.plant, name), PUSHERS)}
+    pushers = {pusher.name for pusher in machine.components_of(*PUSHERS)}
+    return {name: channel for name, channel in list_movers(machine).items() if name in pushers}
 
 
 def list_computed(machine: Machine) -> dict[str, Channel]:
@@ -68,11 +68,11 @@ def list_sensors(machine: Machine) -> dict[str, str]:
     The quantity is `position`, `velocity` or `force`. The force required by a prescribed motion is
     not among them: inverse dynamics computes it after the test.
     """
-    plant, prescribed = machine.plant, set(list_movers(machine)) - set(list_pushers(machine))
+    prescribed = set(list_movers(machine)) - set(list_pushers(machine))
     prescribed_joints = {machine.components[name].joint for name in prescribed}
     readable = {}
     for name, component in machine.components.items():
-        kind = measures(getattr(plant, name))
+        kind = component.quantity
         if not kind or component.channel is None or not component.acts_on:
             continue
         if kind != "force" or not prescribed_joints & {joint for joint, _ in component.acts_on}:

@@ -24,26 +24,30 @@ from rigtwin.components import (
     PositionActuator,
     Rotor,
     Servo,
-    measures,
+    component_of,
 )
 from rigtwin.components.body import list_parameters, list_surplus, turn_gravity
 from rigtwin.components.conditioning import actuator, condition_all, hold
 from rigtwin.components.effect import Motion
-from rigtwin.components.guide import SHAPES, Friction, friction, friction_size
-from rigtwin.components.plant import Plant
-from rigtwin.components.sensors import apply_sensor
-from rigtwin.components.servo import Push, push, push_law
+from rigtwin.components.guide import Friction, acts, friction, friction_size
+from rigtwin.components.plant import Plant, select
+from rigtwin.components.sensors import apply_sensor, sensor_of
+from rigtwin.components.servo import Push, push, push_law, pusher_of
 from rigtwin.description.configuration import Configuration
-from rigtwin.description.machine import Component, Machine, ReplayOf, Row
+from rigtwin.description.machine import Machine, ReplayOf, Row
 from rigtwin.models.basis import Passage, forms
 from rigtwin.models.following import follow_command
-from rigtwin.models.forward_motion import GuideContacts, Servos, State, StepInputs, advance
+from rigtwin.models.forward_arrays import GuideContacts, Servos, State, StepInputs, allocate
+from rigtwin.models.forward_motion import advance
 from rigtwin.models.initial_state import InitialState, Seen, Sense
-from rigtwin.models.joint import ELASTIC, KEPT, LIGHTEST, SEED, SMALL, recover_motion
+from rigtwin.models.joint import SEED, SMALL
 from rigtwin.models.joint_motion import RIGID
+from rigtwin.models.joint_simulation import KEPT, LIGHTEST
+from rigtwin.models.measured_motion import ELASTIC, recover_motion
 from rigtwin.models.model import Form, Model
 from rigtwin.models.multibody import Multibody, inertia_at
 from rigtwin.numerics.arrays import Array, clip_diverged, interpolate
+from rigtwin.numerics.memo import Memo
 from rigtwin.recording import Inputs
 from rigtwin.signals.noise import smooth, white_noise
 
@@ -91,48 +95,46 @@ class ForwardDynamicsModel(Model[Plant]):
         self._period, self._ticks = inputs.period, inputs.ticks
         self.rows: tuple[Row, ...] = replay.rows
         components = machine.components
-        plant = configuration.plant
-        self._pushers = [n for n in replay.moved_by if isinstance(getattr(plant, n), ForceActuator)]
-        self._servos = [n for n in replay.moved_by if isinstance(getattr(plant, n), Servo)]
+        movers = [(name, components[name].component_type) for name in replay.moved_by]
+        self._pushers = [name for name, of in movers if of is ForceActuator]
+        self._servos = [name for name, of in movers if of is Servo]
         self._leaders = [n for n in replay.moved_by if n not in (*self._pushers, *self._servos)]
         # The free coordinates come first, the prescribed ones after them.
         joints = [*replay.free, *(components[name].joint for name in self._leaders)]
-        at: dict[type, list[Component]] = {Guide: [], Rotor: [], Body: [], Base: []}
-        for component in components.values():
-            at.get(type(getattr(plant, component.name)), []).append(component)
-        self._bodies = Multibody(machine.model, joints, at[Guide], at[Rotor])
-        self._heavy = {component.name: component.mjcf for component in at[Body]}
-        self._base = at[Base][0].name if at[Base] else None
+        guides, rotors = machine.components_of(Guide), machine.components_of(Rotor)
+        self._bodies = Multibody(machine.model, joints, guides, rotors)
+        self._heavy = {body.name: body.mjcf for body in machine.components_of(Body)}
+        self._base = next((base.name for base in machine.components_of(Base)), None)
         self._along = {
             name: self._bodies.express(component.acts_on) for name, component in components.items()
         }
         self._zero = {
             name: self._bodies.measure(component.acts_on) for name, component in components.items()
         }
-        self._guides = [c.name for c in at[Guide] if self._along[c.name].any()]
-        self._rotors = [c.name for c in at[Rotor] if self._along[c.name].any()]
+        self._guides = [guide.name for guide in guides if self._along[guide.name].any()]
+        self._rotors = [rotor.name for rotor in rotors if self._along[rotor.name].any()]
         self._loose = len(replay.free)
         self._free = np.arange(self._loose)
         self._held = np.arange(len(replay.free), len(joints))
         self._read_motions(inputs)
         self._loosest = self._find_loosest()
-        self._changed: dict[tuple[object, ...], Multibody] = {}
-        self._last: dict[tuple[object, ...], Array] = {}
-        self._starts: dict[tuple[object, ...], Array] = {}
+        self._changed: Memo[Multibody] = Memo(KEPT)
+        self._last: Memo[Array] = Memo(KEPT)
+        self._starts: Memo[Array] = Memo(KEPT)
         self._judge_start()
 
     def _read_motions(self, inputs: Inputs) -> None:
         """Smooth the prescribed motions and collect the sensors that show the initial state."""
-        components, plant = self._machine.components, self._configuration.plant
+        components = self._machine.components
         self._read = {
             name: smooth(self._column(name), self._period)
             for name in self._leaders
-            if measures(getattr(plant, name)) == "position"
+            if components[name].quantity == "position"
         }
         seen = {
             name: self._seen_by(name, kind)
             for name, component in components.items()
-            if (kind := measures(getattr(plant, name))) in ("position", "velocity")
+            if (kind := component.quantity) in ("position", "velocity")
             and component.channel in inputs.channels
             and self._along[name].any()
         }
@@ -218,26 +220,28 @@ class ForwardDynamicsModel(Model[Plant]):
         size = self._bodies.coordinates
         inertia = np.zeros((size, size))
         for name in self._rotors:
-            inertia += getattr(plant, name).inertia * np.outer(self._along[name], self._along[name])
+            along, rotor = self._along[name], component_of(plant, name, Rotor)
+            inertia += rotor.inertia * np.outer(along, along)
         return inertia
 
     def _bodies_of(self, plant: Plant) -> Multibody:
         """Return the rigid bodies with the plant's inertial parameters and tilt of the base."""
         # A change of bodies recompiles the MJCF, so the last few variants are remembered.
-        key = tuple(getattr(plant, name) for name in (*self._heavy, *self._bases()))
-        if key not in self._changed:
-            changed = {}
-            for name, mjcf in self._heavy.items():
-                body, nominal = getattr(plant, name), self._bodies.list_nominal(mjcf)
-                if list_surplus(body, *nominal).any():
-                    changed[mjcf] = list_parameters(body, nominal[0], nominal[2])
-            base = None if self._base is None else getattr(plant, self._base)
-            multibody = self._bodies
-            if changed or (base is not None and any(base)):
-                turn = None if base is None else (lambda gravity: turn_gravity(base, gravity))
-                multibody = self._bodies.change(changed, turn)
-            self._changed = {**dict(list(self._changed.items())[-KEPT:]), key: multibody}
-        return self._changed[key]
+        key = select(plant, (*self._heavy, *self._bases()))
+        return self._changed.recall(key, lambda: self._change_bodies(plant))
+
+    def _change_bodies(self, plant: Plant) -> Multibody:
+        changed = {}
+        for name, mjcf in self._heavy.items():
+            body = component_of(plant, name, Body)
+            nominal = self._bodies.list_nominal(mjcf)
+            if list_surplus(body, *nominal).any():
+                changed[mjcf] = list_parameters(body, nominal[0], nominal[2])
+        base = None if self._base is None else component_of(plant, self._base, Base)
+        if not changed and (base is None or not any(base)):
+            return self._bodies
+        turn = None if base is None else (lambda gravity: turn_gravity(base, gravity))
+        return self._bodies.change(changed, turn)
 
     def _bases(self) -> tuple[str, ...]:
         return () if self._base is None else (self._base,)
@@ -254,13 +258,13 @@ class ForwardDynamicsModel(Model[Plant]):
         time = np.arange(self._ticks + 1) * self._period
         fine = np.arange(count) * (self._period / self._steps)
         for place, name in zip(self._held, self._leaders, strict=True):
-            mover = getattr(plant, name)
-            if isinstance(mover, PositionActuator):
+            if name in self._read:
+                signal = self._read[name][0] + shifts.get(name, 0.0)
+                position = recover_motion(sensor_of(plant, name), signal, self._period)
+            else:
+                mover = component_of(plant, name, PositionActuator)
                 late, command = plant.computer.delay, self._column(name)
                 position = follow_command(mover, command, late, self._period, self._steps)
-            else:
-                signal = self._read[name][0] + shifts.get(name, 0.0)
-                position = recover_motion(mover, signal, self._period)
             position = (position - self._zero[name]) / self._along[name][place]
             # The last step needs a position beyond the last tick: extrapolated.
             position = np.append(position, 2.0 * position[-1] - position[-2])
@@ -272,7 +276,7 @@ class ForwardDynamicsModel(Model[Plant]):
         commands = np.zeros((len(names), self._ticks * self._steps))
         for number, name in enumerate(names):
             command = np.ascontiguousarray(self._column(name))
-            mover = getattr(plant, name)
+            mover = pusher_of(plant, name)
             conditioning = actuator(mover, plant.computer, self._period / self._steps)
             condition_all(
                 conditioning,
@@ -287,19 +291,19 @@ class ForwardDynamicsModel(Model[Plant]):
         """Return the forces of the force actuators at the steps, N, shape (actuators, steps)."""
         forces = self._condition(plant, self._pushers)
         for number, name in enumerate(self._pushers):
-            mover: ForceActuator = getattr(plant, name)
+            mover = component_of(plant, name, ForceActuator)
             limit = self._limit(plant, name)
             forces[number] = np.clip(mover.constant * forces[number], -limit, limit)
         return forces
 
     def _limit(self, plant: Plant, name: str) -> float:
         """Return the force limit of a force actuator, N."""
-        return min(getattr(plant, name).force_limit, UNLIMITED)
+        return min(pusher_of(plant, name).force_limit, UNLIMITED)
 
     def _serve(self, plant: Plant, commands: Array) -> Servos:
         """Return the servos with conditioned commands at the steps, shape (servos, steps)."""
         size, names = self._bodies.coordinates, self._servos
-        laws = [push_law(getattr(plant, name)) for name in names]
+        laws = [push_law(pusher_of(plant, name)) for name in names]
         return Servos(
             laws=np.array(laws, float).reshape(len(names), len(Push._fields)),
             levers=np.array([self._along[name] for name in names]).reshape(-1, size),
@@ -332,7 +336,7 @@ class ForwardDynamicsModel(Model[Plant]):
         """
         # Rigid dry friction has no spring of its own. A numerical one is as stiff as the step
         # resolves; it keeps the friction single-valued, so that a sticking joint stays put.
-        guides = [getattr(plant, name) for name in self._guides]
+        guides = [component_of(plant, name, Guide) for name in self._guides]
         h = self._period / self._steps
         dry = [friction(guide) for guide in guides]
         springs = np.empty(len(guides))
@@ -362,7 +366,7 @@ class ForwardDynamicsModel(Model[Plant]):
                 [self._bodies.rest_of(self._machine.components[name]) for name in self._guides]
             ),
             inertia=self._loosest,
-            acts=np.array([_acts(guide) for guide in guides], bool),
+            acts=np.array([acts(guide) for guide in guides], bool),
             rubs=np.array([friction_size(each, 1.0) > 0.0 for each in dry], bool),
         )
 
@@ -372,11 +376,9 @@ class ForwardDynamicsModel(Model[Plant]):
         """Return initial positions and velocities, m and m/s, shape (2, coordinates)."""
         if self._quick or not self._start.fitted:
             return self._start.read(plant)
-        key = self._key(plant)
-        if key not in self._starts:
-            start = self._start.find(plant, self._sense_from(plant))
-            self._starts = {**dict(list(self._starts.items())[-KEPT:]), key: start}
-        return self._starts[key]
+        return self._starts.recall(
+            self._key(plant), lambda: self._start.find(plant, self._sense_from(plant))
+        )
 
     def _sense_from(self, plant: Plant) -> Sense:
         """Return a function that predicts the rows from an initial state, for some ticks."""
@@ -415,7 +417,7 @@ class ForwardDynamicsModel(Model[Plant]):
             *self._start.sensors,
             "computer",
         }
-        return tuple(getattr(plant, name) for name in sorted(names))
+        return select(plant, sorted(names))
 
     def _no_force(self) -> tuple[Array, Array]:
         return (
@@ -443,6 +445,7 @@ class ForwardDynamicsModel(Model[Plant]):
             h = self._period / self._steps
             state = begin(contacts, start, inputs.prescribed, self._held, h)
             out = np.zeros((3, size, ticks))
+            work = allocate(size, self._loose, len(self._guides), len(self._servos))
             advance(
                 bodies=bodies,
                 contacts=contacts,
@@ -452,6 +455,7 @@ class ForwardDynamicsModel(Model[Plant]):
                 inputs=inputs._replace(
                     disturbance=disturbance, guide_disturbance=guide_disturbance
                 ),
+                work=work,
                 h=h,
                 steps=self._steps,
                 first=0,
@@ -489,22 +493,19 @@ class ForwardDynamicsModel(Model[Plant]):
             force is the one required at a prescribed coordinate, and the actuators' force at a
             free one.
         """
-        plain = disturbance is None and guide_disturbance is None and not shifts
-        key = self._key(plant)
-        if plain and key in self._last:
-            return self._last[key]
-        undisturbed = self._no_force()
-        out = clip_diverged(
-            self._prepare(plant, shifts or {})(
+
+        def compute() -> Array:
+            undisturbed = self._no_force()
+            moved = self._prepare(plant, shifts or {})(
                 self._start_of(plant),
                 undisturbed[0] if disturbance is None else disturbance,
                 undisturbed[1] if guide_disturbance is None else guide_disturbance,
                 self._ticks,
             )
-        )
-        if plain:
-            self._last = {**dict(list(self._last.items())[-KEPT:]), key: out}
-        return out
+            return clip_diverged(moved)
+
+        plain = disturbance is None and guide_disturbance is None and not shifts
+        return self._last.recall(self._key(plant), compute) if plain else compute()
 
     # Sensors
 
@@ -524,7 +525,7 @@ class ForwardDynamicsModel(Model[Plant]):
     def _apply_sensors(self, plant: Plant, true: Array) -> Array:
         return np.stack(
             [
-                apply_sensor(getattr(plant, row.name), signal, self._period)
+                apply_sensor(sensor_of(plant, row.name), signal, self._period)
                 for row, signal in zip(self.rows, true, strict=True)
             ]
         )
@@ -574,7 +575,7 @@ class ForwardDynamicsModel(Model[Plant]):
             pushed = self._push(plant)[self._pushers.index(component), :: self._steps]
             return position, speed, pushed
         if component in self._servos:
-            law = push_law(getattr(plant, component))
+            law = push_law(pusher_of(plant, component))
             command = self._condition(plant, [component])[0, :: self._steps]
             at = position + self._zero[component]
             passed = [push(law, *each) for each in zip(command, at, speed, strict=True)]
@@ -594,7 +595,8 @@ class ForwardDynamicsModel(Model[Plant]):
 
     def forms(self, component: str, plant: Plant) -> list[Form]:
         position, speed, force = self._passage(component, plant)
-        part, names = getattr(plant, component), [row.name for row in self.rows]
+        names = [row.name for row in self.rows]
+        # A component's role decides which shapes of a disturbance are plausible there.
         signal, role = force, "guide"
         if component in names:
             signal, role = self.predict(plant)[names.index(component)], "sensor"
@@ -602,7 +604,7 @@ class ForwardDynamicsModel(Model[Plant]):
             role = "force"
         elif component in self._leaders:
             signal, role = position, "position"
-        elif isinstance(part, Rotor):
+        elif component in self._rotors:
             role = "mass"
         return forms(role, component, Passage(signal, position, speed, force, self._period))
 
@@ -651,11 +653,6 @@ def _average_commands(inputs: Inputs, every: int) -> Inputs:
         for topic, names in inputs.columns.items()
     }
     return replace(inputs, period=every * inputs.period, columns=columns)
-
-
-def _acts(guide: Guide) -> bool:
-    """Return whether any parameter of a guide has an effect."""
-    return any(value for name, value in guide._asdict().items() if name not in SHAPES)
 
 
 def begin(

@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from rigtwin.components import UNLIMITED, ForceActuator, Servo, measures
+from rigtwin.components import UNLIMITED, Mass, Servo, component_of
 from rigtwin.components.conditioning import actuator
 from rigtwin.components.plant import Plant
-from rigtwin.components.sensors import apply_sensor
-from rigtwin.components.servo import push_law
+from rigtwin.components.sensors import apply_sensor, sensor_of
+from rigtwin.components.servo import push_law, pusher_of
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Machine, ReplayOf, Row
 from rigtwin.models.commanding import Command, Readings, commands_of
@@ -33,7 +33,8 @@ class ForwardDynamicsTwin(ForwardDynamicsModel):
         for replay in self._machine.replays:
             nominal_mass = replay.joint.inertia - replay.joint.armature
             if replay.mass is not None and nominal_mass > 0.0:
-                shares[replay.joint.name] = getattr(plant, replay.mass).mass / nominal_mass
+                mass = component_of(plant, replay.mass, Mass).mass
+                shares[replay.joint.name] = mass / nominal_mass
         return (
             multibody.scale(shares) if any(share != 1.0 for share in shares.values()) else multibody
         )
@@ -68,7 +69,7 @@ class ForwardDynamicsTwin(ForwardDynamicsModel):
             held=self._held,
             state=begin(contacts, self._start_of(plant), inputs.prescribed, self._held, h),
             inputs=inputs,
-            laws=[push_law(getattr(plant, name)) for name in self._servos],
+            laws=[push_law(pusher_of(plant, name)) for name in self._servos],
             drives=[self._drive(plant, name, h) for name in outputs],
             sensing=[IdealSensor(r, self._along[r.name], self._zero[r.name]) for r in sensors],
             h=h,
@@ -111,19 +112,19 @@ class ForwardDynamicsTwin(ForwardDynamicsModel):
         return out, commands
 
     def _drive(self, plant: Plant, name: str, h: float) -> SteppedActuator:
-        mover: ForceActuator | Servo = getattr(plant, name)
+        mover = pusher_of(plant, name)
         model = actuator(mover, plant.computer, h)
         if isinstance(mover, Servo):
             return SteppedActuator(model, 1.0, UNLIMITED, True, self._servos.index(name))
         limit = self._limit(plant, name)
         return SteppedActuator(model, mover.constant, limit, False, self._pushers.index(name))
 
-    def list_sensors(self, plant: Plant) -> list[Row]:
+    def list_sensors(self) -> list[Row]:
         """Return the sensors of the joints and the quantity that each reads."""
         return [
             Row(name, kind, component.channel, component.unit)
             for name, component in self._machine.components.items()
-            if (kind := measures(getattr(plant, name)))
+            if (kind := component.quantity)
             and component.channel is not None
             and component.acts_on
             and self._along[name].any()
@@ -209,11 +210,11 @@ def simulate_forward(
     plant, period = configuration.plant, configuration.timing.period
     model, readings = _at_start(machine, replay, configuration, demands)
     moved = model.move(plant)
-    for row in model.list_sensors(plant):
+    for row in model.list_sensors():
         # Sensors that prescribe motion read their demand, which is in `readings` already.
         if row.name not in readings:
             true = model.observe(row, moved)
-            readings[row.name] = apply_sensor(getattr(plant, row.name), true, period)
+            readings[row.name] = apply_sensor(sensor_of(plant, row.name), true, period)
     return SimulatedSignals(readings, not has_diverged(moved))
 
 
@@ -251,7 +252,7 @@ def simulate_controlled(
     plant, period = configuration.plant, configuration.timing.period
     no_commands = {name: np.zeros(ticks) for name in outputs}
     model, prescribed = _at_start(machine, replay, configuration, {**no_commands, **demands})
-    sensors, readable = model.list_sensors(plant), list_sensors(machine)
+    sensors, readable = model.list_sensors(), list_sensors(machine)
     read = [row for row in sensors if row.name in readable]
     readings = Readings(plant, [row.name for row in read], noise, period, ticks)
     moved, commands = model.simulate_controlled(plant, outputs, command, readings, read)
@@ -259,7 +260,7 @@ def simulate_controlled(
     for row in sensors:
         if row.name not in readings.signals:
             true = model.observe(row, moved)
-            unread[row.name] = apply_sensor(getattr(plant, row.name), true, period)
+            unread[row.name] = apply_sensor(sensor_of(plant, row.name), true, period)
     signals = {**unread, **readings.signals, **dict(zip(outputs, commands, strict=True))}
     return SimulatedSignals(
         signals, not has_diverged(moved), frozenset({*readings.signals, *outputs})
@@ -272,9 +273,9 @@ def _at_start(
     """Return the model before its test, and the readings of sensors that prescribe motion."""
     plant, period = configuration.plant, configuration.timing.period
     prescribed = {
-        name: apply_sensor(getattr(plant, name), demand, period)
+        name: apply_sensor(sensor_of(plant, name), demand, period)
         for name, demand in demands.items()
-        if measures(getattr(plant, name))
+        if machine.components[name].quantity
     }
     inputs = inputs_of_test(machine, {**demands, **prescribed}, period)
     unobserved = replace(replay, rows=())

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigtwin.components.plant import Plant
+from rigtwin.components.sensors import sensor_of
 from rigtwin.models.joint_start import FORGOTTEN, SHOWS, guess_place
 from rigtwin.models.start import ERRORS, LIKELY, find_slopes, fit_start, read_start, start_error
 from rigtwin.numerics.arrays import Array
@@ -120,7 +121,7 @@ class InitialState:
         positions: list[Array] = [FIRMNESS * self._place]
         speeds: list[Array] = [np.zeros(len(self._place))]
         for name, seen in self._seen.items():
-            sensor = getattr(plant, name)
+            sensor = sensor_of(plant, name)
             value, slope = read_start(seen.measured, self._period)
             value = (value - sensor.offset) / sensor.gain
             if seen.kind == "position":

@@ -14,24 +14,29 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rigtwin.components import Base, Body, Guide, PositionSensor, Rotor, Schedule, measures
+from rigtwin.components import Base, Body, Guide, Rotor, Schedule
 from rigtwin.components.body import list_surplus
 from rigtwin.components.effect import Motion
-from rigtwin.components.guide import SHAPES, friction, friction_size
-from rigtwin.components.plant import Plant
+from rigtwin.components.guide import acts
+from rigtwin.components.guide_step import guide_step_of
+from rigtwin.components.plant import Plant, component_of, select
 from rigtwin.components.schedule import follow, scheduled_force
-from rigtwin.components.sensors import apply_sensor
-from rigtwin.description.machine import Component, Machine, ReplayOf, Row
+from rigtwin.components.sensors import apply_sensor, sensor_of
+from rigtwin.description.machine import Machine, ReplayOf, Row
 from rigtwin.models.basis import Passage, forms
-from rigtwin.models.joint import ELASTIC, KEPT, SEED, SMALL, recover_motion
-from rigtwin.models.joint_motion import resist, resist_at_once
+from rigtwin.models.joint import SEED, SMALL
+from rigtwin.models.joint_inverse import resist, resist_at_once
+from rigtwin.models.joint_simulation import KEPT
+from rigtwin.models.measured_motion import ELASTIC, recover_motion, softest_contact
 from rigtwin.models.model import Form, Model
 from rigtwin.models.rigid import RigidBodies
 from rigtwin.numerics.arrays import Array
+from rigtwin.numerics.memo import Memo
 from rigtwin.recording import Inputs
 from rigtwin.signals.band import limit_band
 from rigtwin.signals.noise import smooth, white_noise
@@ -85,18 +90,16 @@ class InverseDynamicsModel(Model[Plant]):
         self._row_of = {
             components[row.name].joint: number for number, row in enumerate(replay.rows)
         }
-        kinds = (Guide, Rotor, Body, Base, Schedule)
-        at: dict[type, list[Component]] = {kind: [] for kind in kinds}
-        for component in components.values():
-            at.get(type(getattr(machine.plant, component.name)), []).append(component)
-        self._bodies = RigidBodies(machine.model, joints, at[Guide], at[Rotor])
-        self._heavy = {component.name: component.mjcf for component in at[Body]}
-        self._base = at[Base][0].name if at[Base] else None
+        guides, rotors = machine.components_of(Guide), machine.components_of(Rotor)
+        schedules = machine.components_of(Schedule)
+        self._bodies = RigidBodies(machine.model, joints, guides, rotors)
+        self._heavy = {body.name: body.mjcf for body in machine.components_of(Body)}
+        self._base = next((base.name for base in machine.components_of(Base)), None)
         self._along: dict[str, Array] = {}
         """Component → its direction in the joints, shape (joints,)."""
         self._onto: dict[str, Array] = {}
         """Component → share of its force in each observed row, shape (rows,)."""
-        for component in (*at[Guide], *at[Rotor], *at[Schedule]):
+        for component in (*guides, *rotors, *schedules):
             along, onto = np.zeros(len(joints)), np.zeros(len(self.rows))
             for joint, coefficient in component.acts_on:
                 if joint in self._place:
@@ -107,19 +110,19 @@ class InverseDynamicsModel(Model[Plant]):
                 self._along[component.name], self._onto[component.name] = along, onto
         self._schedules = {
             component.name: inputs.column(*component.channel)
-            for component in at[Schedule]
+            for component in schedules
             if component.channel is not None
         }
         """Name of each schedule → values of its channel, shape (ticks,)."""
         self._read: Mapping[str, tuple[Array, float]] = (
             like._read
             if like is not None
-            else {name: self._smooth(self._measured(name)) for name in self._movers}
+            else {name: smooth(self._measured(name), self._period) for name in self._movers}
         )
-        self._motions: dict[tuple[object, ...], tuple[Kinematics, Array]] = {}
-        self._columns: dict[tuple[object, ...], Array] = {}
-        self._shares: dict[tuple[object, ...], Array] = {}
-        self._drawn: dict[tuple[object, ...], list[tuple[Kinematics, Array]]] = {}
+        self._motions: Memo[tuple[Kinematics, Array]] = Memo(KEPT)
+        self._columns: Memo[Array] = Memo(REGRESSORS)
+        self._shares: Memo[Array] = Memo(KEPT * max(len(self._along), 1))
+        self._drawn: Memo[list[tuple[Kinematics, Array]]] = Memo(1)
 
     @property
     def band(self) -> float:
@@ -134,9 +137,6 @@ class InverseDynamicsModel(Model[Plant]):
         channel = self._machine.components[name].channel
         assert channel is not None
         return self._signals.column(*channel)
-
-    def _smooth(self, signal: Array) -> tuple[Array, float]:
-        return smooth(signal, self._period)
 
     def thin(self, longest: float) -> InverseDynamicsModel:
         every = max(int(longest / self._period), 1)
@@ -155,8 +155,7 @@ class InverseDynamicsModel(Model[Plant]):
             signal = self._read[name][0]
             if shifts is not None and name in shifts:
                 signal = signal + shifts[name]
-            sensor: PositionSensor = getattr(plant, name)
-            positions.append(recover_motion(sensor, signal, self._period))
+            positions.append(recover_motion(sensor_of(plant, name), signal, self._period))
         position = np.stack(positions)
         # Differentiate before thinning: differences over dropped ticks would smooth the motion.
         velocity = np.gradient(position, self._period, axis=1)
@@ -168,50 +167,48 @@ class InverseDynamicsModel(Model[Plant]):
 
         Gravity is that of the plant's base, which may be tilted.
         """
-        key = self._key(plant)
-        if key not in self._motions:
+
+        def compute() -> tuple[Kinematics, Array]:
             motion = self._move(plant)
-            forces = self._bodies.forces(motion, self._gravity(plant))
-            self._motions = {**dict(list(self._motions.items())[-KEPT:]), key: (motion, forces)}
-        return self._motions[key]
+            return motion, self._bodies.forces(motion, self._gravity(plant))
+
+        return self._motions.recall(self._key(plant), compute)
 
     def _key(self, plant: Plant) -> tuple[object, ...]:
         """Return all components that motion and gravity depend on."""
         names = (*self._movers, self._base) if self._base is not None else self._movers
-        return tuple(getattr(plant, name) for name in names)
+        return select(plant, names)
 
     def _gravity(self, plant: Plant) -> Array | None:
-        return None if self._base is None else self._bodies.turn(getattr(plant, self._base))
+        if self._base is None:
+            return None
+        return self._bodies.turn(component_of(plant, self._base, Base))
 
     def _loaded(self, plant: Plant) -> tuple[Kinematics, Array]:
         """Return the joints' motion and the forces of the plant's bodies, N."""
         motion, forces = self._moved(plant)
         return motion, forces + self._surplus(plant, motion, self._key(plant))
 
-    def _surplus(
-        self, plant: Plant, motion: Kinematics, key: tuple[object, ...] | None = None
-    ) -> Array | float:
+    def _surplus(self, plant: Plant, motion: Kinematics, key: tuple[object, ...]) -> Array | float:
         """Return Y·Δπ, the forces of the plant's bodies less those of the MJCF's, N.
 
-        `key` names the motion where its regressors may be remembered.
+        `key` names the motion, whose regressors are remembered.
         """
         surplus: Array | float = 0.0
         for name, mjcf in self._heavy.items():
-            more = list_surplus(getattr(plant, name), *self._bodies.list_nominal(mjcf))
+            body = component_of(plant, name, Body)
+            more = list_surplus(body, *self._bodies.list_nominal(mjcf))
             if not more.any():
                 continue
-            columns = self._columns.get((name, key)) if key is not None else None
-            if columns is None:
-                columns = self._bodies.regressor(motion, mjcf, self._gravity(plant))
-            if key is not None:
-                remembered = dict(list(self._columns.items())[-REGRESSORS:])
-                self._columns = {**remembered, (name, key): columns}
+            compute = partial(self._bodies.regressor, motion, mjcf, self._gravity(plant))
+            columns = self._columns.recall((name, key), compute)
             surplus = surplus + np.tensordot(more, columns, 1)
         return surplus
 
     def _share_of(self, name: str, plant: Plant, motion: Kinematics, bodies: Array) -> Array:
         """Return the force of a guide or rotor along its own direction, N, shape (ticks,)."""
-        component, along = getattr(plant, name), self._along[name]
+        along = self._along[name]
+        component = component_of(plant, name, Guide, Rotor, Schedule)
         if isinstance(component, Rotor):
             return component.inertia * (along @ motion[2])
         if isinstance(component, Schedule):
@@ -222,35 +219,16 @@ class InverseDynamicsModel(Model[Plant]):
             return scheduled_force(component, level, own_motion, 1.0 / over)
         guide = Guide(*(float(value) for value in component))
         # A guide whose only values are the shapes of absent effects exerts no force.
-        if guide == Guide()._replace(**{name: getattr(guide, name) for name in SHAPES}):
+        if not acts(guide):
             return np.zeros(motion.shape[2])
         guide_motion = np.ascontiguousarray(np.einsum("j,kjt->kt", along, motion))
         load = along @ bodies / float(along @ along)
         out = load.copy()
-        if guide.compliance == guide.mount_compliance == guide.backlash == 0.0:
-            resist_at_once(guide, friction(guide), 0.0, self._interval, guide_motion, out)
-            return out - load
-        resist(
-            guide=guide,
-            dry_friction=friction(guide),
-            spring=1.0 / self._softest(guide, guide_motion, load, along),
-            rest=0.0,
-            period=self._interval,
-            motion=guide_motion,
-            out=out,
-        )
+        at_once = guide.compliance == guide.mount_compliance == guide.backlash == 0.0
+        softest = softest_contact(guide, load, guide_motion[0], self._position_error(along))
+        guide_step = guide_step_of(guide, 1.0 / softest, 0.0, self._interval)
+        (resist_at_once if at_once else resist)(guide_step, guide_motion, out)
         return out - load
-
-    def _softest(self, guide: Guide, motion: Array, load: Array, along: Array) -> float:
-        """Return the compliance in series with dry friction, m/N.
-
-        The error of the measured motion hides smaller ones: friction that reverses builds up over
-        at least that distance.
-        """
-        size = max(friction_size(friction(guide), float(np.sqrt(np.mean(load**2)))), 1e-300)
-        error = self._position_error(along)
-        stroke = max(float(np.ptp(motion[0])), 1e-12)
-        return max(guide.compliance, ELASTIC * error / size, 1e-9 * stroke / size)
 
     def _position_error(self, along: Array) -> float:
         """Return the standard error of the measured position along a direction, m."""
@@ -259,14 +237,8 @@ class InverseDynamicsModel(Model[Plant]):
 
     def _force_of(self, name: str, plant: Plant) -> Array:
         """Return `_share_of` at the plant's own motion, remembered."""
-        heavy = (getattr(plant, each) for each in self._heavy)
-        key = (name, getattr(plant, name), *self._key(plant), *heavy)
-        force = self._shares.get(key)
-        if force is None:
-            force = self._share_of(name, plant, *self._loaded(plant))
-            most = KEPT * max(len(self._along), 1)
-            self._shares = {**dict(list(self._shares.items())[-most:]), key: force}
-        return force
+        key = (name, *select(plant, [name, *self._heavy]), *self._key(plant))
+        return self._shares.recall(key, lambda: self._share_of(name, plant, *self._loaded(plant)))
 
     def _rows_of(self, bodies: Array) -> Array:
         places = [self._place[self._machine.components[row.name].joint] for row in self.rows]
@@ -283,7 +255,7 @@ class InverseDynamicsModel(Model[Plant]):
     def _apply_sensors(self, plant: Plant, true: Array) -> Array:
         sensed = np.stack(
             [
-                apply_sensor(getattr(plant, row.name), signal, self._interval)
+                apply_sensor(sensor_of(plant, row.name), signal, self._interval)
                 for row, signal in zip(self.rows, true, strict=True)
             ]
         )
@@ -321,8 +293,9 @@ class InverseDynamicsModel(Model[Plant]):
 
     def forms(self, component: str, plant: Plant) -> list[Form]:
         (position, speed, _), load, force = self._passage(component, plant)
-        part = getattr(plant, component)
-        role = "sensor" if measures(part) else "mass" if isinstance(part, Rotor) else "guide"
+        known = self._machine.components[component]
+        rotates = known.component_type is Rotor
+        role = "sensor" if known.quantity else "mass" if rotates else "guide"
         return forms(role, component, Passage(force, position, speed, load, self._interval))
 
     def disturbance_size(self, entry: str) -> float:
@@ -348,7 +321,7 @@ class InverseDynamicsModel(Model[Plant]):
         unknown[:, :end] = unknown[:, -end:] = True
         window = max(round(RESTING / self._interval), 3)
         for name, onto in self._onto.items():
-            if isinstance(getattr(self._machine.plant, name), Guide):
+            if self._machine.components[name].component_type is Guide:
                 speed = np.abs(self._along[name] @ speeds)
                 stands = speed < STANDING * float(np.sqrt(np.mean(speed**2)))
                 unknown |= (onto != 0.0)[:, None] & binary_opening(stands, np.ones(window))
@@ -374,11 +347,11 @@ class InverseDynamicsModel(Model[Plant]):
     def _draw_motions(self, plant: Plant) -> list[tuple[Kinematics, Array]]:
         """Return motions with redrawn noise, and the forces of the MJCF's bodies for them.
 
-        The list is empty if the motions have no noise. The last lists are remembered.
+        The list is empty if the motions have no noise. The last list is remembered.
         """
-        # The seed is fixed, or the same candidate would get another misfit when tried again.
-        key = self._key(plant)
-        if key not in self._drawn:
+
+        def draw() -> list[tuple[Kinematics, Array]]:
+            # The seed is fixed, or the same candidate would get another misfit when tried again.
             random, drawn = np.random.default_rng(SEED), []
             for _ in range(DRAWS):
                 shifts = {}
@@ -387,9 +360,10 @@ class InverseDynamicsModel(Model[Plant]):
                     if error > 0.0:
                         level = white_noise(self._measured(name))
                         noise = level * random.standard_normal(len(signal))
-                        shifts[name] = self._smooth(signal + noise)[0] - signal
+                        shifts[name] = smooth(signal + noise, self._period)[0] - signal
                 if shifts:
                     motion = self._move(plant, shifts)
                     drawn.append((motion, self._bodies.forces(motion, self._gravity(plant))))
-            self._drawn = {key: drawn}
-        return self._drawn[key]
+            return drawn
+
+        return self._drawn.recall(self._key(plant), draw)

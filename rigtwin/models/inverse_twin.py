@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from rigtwin.components.sensors import apply_sensor
+from rigtwin.components.sensors import apply_sensor, sensor_of
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Machine
 from rigtwin.models.inputs import inputs_of_test
@@ -54,10 +54,12 @@ def simulate_prescribed(
     (replay,) = machine.replays
     plant, period = configuration.plant, configuration.timing.period
     readings = {
-        name: apply_sensor(getattr(plant, name), motion, period) for name, motion in motions.items()
+        name: apply_sensor(sensor_of(plant, name), motion, period)
+        for name, motion in motions.items()
     }
     inputs = inputs_of_test(machine, readings, period)
+    # The model smooths these readings, as a diagnosis of the recording will.
     forces = InverseDynamicsModel(machine, replay, inputs).predict_true(plant)
     for row, force in zip(replay.rows, forces, strict=True):
-        readings[row.name] = apply_sensor(getattr(plant, row.name), force, period)
+        readings[row.name] = apply_sensor(sensor_of(plant, row.name), force, period)
     return SimulatedSignals(readings, True)

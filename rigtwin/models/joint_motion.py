@@ -23,16 +23,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from controllers.compiled import compilable
+from controllers.compiled import compilable, inlined
 from controllers.formula import Program, run
-from rigtwin.components import Guide
 from rigtwin.components.conditioning import Actuator, ActuatorState, condition
-from rigtwin.components.guide import Friction, damping, dry_limits, position_force, slide
-from rigtwin.components.mount import give_way
+from rigtwin.components.guide import damping, dry_limits, position_force, slide
+from rigtwin.components.guide_step import GuideStep
+from rigtwin.components.mount import MountState, give_way
 from rigtwin.components.sensors import Transducer, TransducerState, transduce
 from rigtwin.components.servo import Push, pull, push
 from rigtwin.numerics.arrays import Array
-from rigtwin.numerics.compiling import kernel
+from rigtwin.numerics.compiling import loop_kernel
 
 FURTHEST = 1e12
 """Largest position that is looked up in the gravity grid, in grid spacings."""
@@ -52,8 +52,15 @@ class Inertia(NamedTuple):
     first: float  # First position of the grid, m or rad.
     spacing: float  # Spacing of the grid, m or rad.
     load: Array  # Gravity load on the grid, N or Nm, shape (positions,).
-    rest: float  # Position at which the guide's spring is slack, m or rad.
     turns: bool  # Whether the joint turns round, so that the grid's end is its beginning.
+
+
+class Drive(NamedTuple):
+    """Force actuator or servo that pushes one joint."""
+
+    law: Push  # Law from the conditioned command to the force.
+    conditioning: Actuator  # Conditioning of the command, for one integration step.
+    held: ActuatorState  # State of the conditioning, changed in place.
 
 
 class Loop(NamedTuple):
@@ -65,7 +72,11 @@ class Loop(NamedTuple):
     memory: Array  # State of the formula (integrals, filters, delays).
     recorded: Array  # Recorded inputs of the controller, shape (ticks, inputs).
     noise: Array  # Noise added to simulated inputs, shape (ticks, inputs).
-    sensor: np.ndarray  # Simulated sensor of each input, or −1 for a recorded one.
+    sensor_of_input: np.ndarray  # Simulated sensor of each input, or −1 for a recorded one.
+    sensors: tuple[Transducer, ...]  # Sensors that the controller reads.
+    states: tuple[TransducerState, ...]  # States of these sensors, changed in place.
+    neutral: np.ndarray  # Whether each sensor reads the true quantity.
+    rates: np.ndarray  # Quantity of each sensor: 0 position, 1 velocity.
 
 
 @compilable
@@ -97,153 +108,135 @@ def gravity(inertia: Inertia, position: float) -> float:
     return (1.0 - part) * inertia.load[whole] + part * inertia.load[whole + 1]
 
 
-@kernel
-def resist(
-    guide: Guide,
-    dry_friction: Friction,
-    spring: float,
-    rest: float,
-    period: float,
-    motion: Array,
-    out: Array,
-) -> None:
-    """Add a guide's forces to the load that it transmits, for a prescribed motion.
+@inlined
+def compute_command(loop: Loop, tick: int, x: float, v: float, period: float) -> float:
+    """Return the controller's command at a tick, and advance the states of its sensors.
 
     Parameters
     ----------
-    guide, dry_friction
-        Guide that resists the motion, and its dry friction.
-    spring
-        Stiffness in series with the dry friction, N/m.
-    rest
-        Position at which the guide's own spring is slack, m.
+    loop
+        Controller with its sensors.
+    tick
+        Number of the tick.
+    x, v
+        Position and velocity of the joint, m and m/s.
     period
         Time from tick to tick, s.
-    motion
-        Position, velocity and acceleration, m, m/s and m/s², shape (3, ticks).
-    out
-        Transmitted load, N, shape (ticks,); overwritten with the whole force.
     """
-    # At the start the friction spring is slack, as after a long rest.
-    slider, viscous = motion[0, 0], 0.0
-    share = period / (guide.relaxation + period)
-    if guide.mount_compliance > 0.0:
-        inner = motion[0, 0]
-        speed = 0.0
-        for tick in range(motion.shape[1]):
-            place, slider, viscous, force = give_way(
-                guide=guide,
-                dry_friction=dry_friction,
-                spring=spring,
-                rest=rest,
-                share=share,
-                period=period,
-                inner=inner,
-                speed=speed,
-                slider=slider,
-                viscous=viscous,
-                load=out[tick],
-                outer=motion[0, tick],
-            )
-            speed, inner = (place - inner) / period, place
-            out[tick] += force
-        return
-    for tick in range(motion.shape[1]):
-        x, v = motion[0, tick], motion[1, tick]
-        # Load-dependent friction sees inertia, gravity and spring, but not friction itself.
-        transmitted = out[tick] + position_force(guide, x, rest)
-        forward, backward = dry_limits(dry_friction, v, transmitted)
-        dry, by = slide(x - slider, 0.5 * guide.backlash, spring, forward, backward)
-        slider += by
-        viscous += share * (damping(guide, v) * v - viscous)
-        out[tick] = transmitted + dry + viscous + guide.drag * v * abs(v)
+    for number in range(len(loop.sensor_of_input)):
+        source = loop.sensor_of_input[number]
+        value = loop.recorded[tick, number]
+        if source >= 0:
+            value = x if loop.rates[source] == 0 else v
+            # Neutral sensors are skipped: finding one in the tuple at run time costs more than the
+            # rest of a tick.
+            if not loop.neutral[source]:
+                value = transduce(loop.sensors[source], loop.states[source], value)
+            value += loop.noise[tick, number]
+        loop.registers[number] = value
+    return run(loop.program.operations, loop.registers, loop.memory, period)
 
 
-@kernel
-def resist_at_once(
-    guide: Guide, dry_friction: Friction, rest: float, period: float, motion: Array, out: Array
-) -> None:
-    """Add a guide's forces to its load where dry friction has neither backlash nor spring.
+@inlined
+def push_joint(
+    drive: Drive, command: float, last: float, x: float, v: float
+) -> tuple[float, float, float]:
+    """Return the actuator's force over one step.
 
-    The velocity is known, so dry friction follows its sign and reverses in the same tick.
+    The step of the velocity is centred on this position: half of it passes under the command of the
+    step before, and half under that of this step. The force is therefore the mean of both.
 
     Parameters
     ----------
-    guide, dry_friction
-        Guide that resists the motion, and its dry friction.
-    rest
-        Position at which the guide's own spring is slack, m.
-    period
-        Time from tick to tick, s.
-    motion
-        Position, velocity and acceleration, m, m/s and m/s², shape (3, ticks).
-    out
-        Transmitted load, N, shape (ticks,); overwritten with the whole force.
+    drive
+        Force actuator or servo.
+    command
+        Command of this tick, in its unit.
+    last
+        `last` as returned for the step before.
+    x, v
+        Position and velocity of the joint, m and m/s.
+
+    Returns
+    -------
+    tuple
+        Force without a servo's damping, N, the damping, Ns/m, and what the next step needs: the
+        conditioned command of a servo, m, or the force of a force actuator, N.
     """
-    viscous, share = 0.0, period / (guide.relaxation + period)
-    for tick in range(motion.shape[1]):
-        x, v = motion[0, tick], motion[1, tick]
-        transmitted = out[tick] + position_force(guide, x, rest)
-        forward, backward = dry_limits(dry_friction, v, transmitted)
-        dry = forward if v > 0.0 else (-backward if v < 0.0 else 0.0)
-        viscous += share * (damping(guide, v) * v - viscous)
-        out[tick] = transmitted + dry + viscous + guide.drag * v * abs(v)
+    law = drive.law
+    wanted = condition(drive.conditioning, drive.held, command)
+    if law.position_gain <= 0.0:
+        force = push(law, wanted, x, v)
+        return 0.5 * (last + force), 0.0, force
+    pushed, held_by = pull(law, 0.5 * (last + wanted), x), law.damping_gain
+    if abs(pushed - held_by * v) > law.limit:
+        # A saturated servo has a constant force, so it damps nothing.
+        pushed, held_by = math.copysign(law.limit, pushed - held_by * v), 0.0
+    return pushed, held_by, wanted
 
 
-@kernel
-def inverse_dynamics(
-    guide: Guide,
-    dry_friction: Friction,
-    inertia: Inertia,
-    spring: float,
-    period: float,
-    motion: Array,
-    out: Array,
-) -> None:
-    """Compute the force that moves the joint as prescribed: m·x'' + g(x) + guide's forces.
+@inlined
+def step_joint(
+    guide_step: GuideStep,
+    mass: float,
+    state: tuple[float, float, float, float],
+    pushed: float,
+    held_by: float,
+    outer: float,
+) -> tuple[float, float, float, float]:
+    """Advance a joint whose guide has a rigid mount by one step.
 
     Parameters
     ----------
-    guide, dry_friction, inertia
-        Guide with its dry friction, and inertia of the joint.
-    spring
-        Stiffness in series with the dry friction, N/m.
-    period
-        Time from tick to tick, s.
-    motion
-        Position, velocity and acceleration, m, m/s and m/s², shape (3, ticks).
-    out
-        Force, written, N, shape (ticks,).
+    guide_step
+        Guide of the joint, for the integration step.
+    mass
+        Inertia of the joint, kg.
+    state
+        Position, m, velocity, m/s, position of the friction element, m, and viscous force, N.
+    pushed, held_by
+        Actuator's force without damping, N, and its damping, Ns/m.
+    outer
+        All forces but the guide's and the damping's: actuator, disturbance and gravity, N.
+
+    Returns
+    -------
+    tuple
+        State after the step.
     """
-    for tick in range(motion.shape[1]):
-        x, a = motion[0, tick], motion[2, tick]
-        out[tick] = inertia.mass * a + gravity(inertia, x)
-    resist(
-        guide=guide,
-        dry_friction=dry_friction,
-        spring=spring,
-        rest=inertia.rest,
-        period=period,
-        motion=motion,
-        out=out,
-    )
+    guide, spring, (x, v, slider, viscous) = guide_step.guide, guide_step.spring, state
+    h, share, half = guide_step.step, guide_step.share, 0.5 * guide.backlash
+    coefficient = damping(guide, v)
+    load = outer - position_force(guide, x, guide_step.rest) - (1.0 - share) * viscous
+    damped = h * (share * coefficient + guide.drag * abs(v) + held_by)
+    # Implicit share of the damping: the midpoint rule's ½ until d·h = 2m, where it would start to
+    # oscillate, and more beyond.
+    ahead = 1.0 - mass / damped if damped > 2.0 * mass else 0.5
+    total = mass + ahead * damped
+    rhs = (mass - (1.0 - ahead) * damped) * v + h * load
+    forward, backward = dry_limits(guide_step.dry_friction, v, pushed)
+    # Without dry friction; then with a stretched spring; then with a slider that slides.
+    velocity = rhs / total
+    stretch_length = x + h * velocity - slider
+    if stretch_length > half or stretch_length < -half:
+        edge = math.copysign(half, stretch_length)
+        velocity = (rhs - h * spring * (x - slider - edge)) / (total + h * h * spring)
+        dry, by = slide(x + h * velocity - slider, half, spring, forward, backward)
+        if by != 0.0:
+            velocity = (rhs - h * dry) / total
+            slider = x + h * velocity - edge - dry / spring
+    between = ahead * velocity + (1.0 - ahead) * v
+    viscous += share * (coefficient * between - viscous)
+    return x + h * velocity, velocity, slider, viscous
 
 
-@kernel
+@loop_kernel
 def integrate_pushed(
-    guide: Guide,
-    dry_friction: Friction,
+    guide_step: GuideStep,
     inertia: Inertia,
-    spring: float,
     start: tuple[float, float],
-    law: Push,
-    drive: Actuator,
-    held: ActuatorState,
-    sensors: tuple[Transducer, ...],
-    states: tuple[TransducerState, ...],
-    kinds: np.ndarray,
+    drive: Drive,
     loop: Loop,
-    command: Array,
     disturbance: Array,
     period: float,
     steps: int,
@@ -253,24 +246,14 @@ def integrate_pushed(
 
     Parameters
     ----------
-    guide, dry_friction, inertia
-        Guide with its dry friction, and inertia of the joint.
-    spring
-        Stiffness in series with the dry friction, N/m.
+    guide_step, inertia
+        Guide of the joint, for the integration step, and inertia of the joint.
     start
         Initial position and velocity, m and m/s.
-    law
-        Law of the force actuator or servo.
-    drive, held
-        Conditioning of its command, and the state of that.
-    sensors, states
-        Sensors that the controller reads, and their states.
-    kinds
-        Measured quantity of each sensor: 0 position, 1 velocity.
+    drive
+        Force actuator or servo.
     loop
         Source of the command.
-    command
-        Recorded command, shape (ticks,); overwritten by the controller in closed loop.
     disturbance
         Unmodelled force on the joint, N, shape (ticks,).
     period
@@ -278,101 +261,34 @@ def integrate_pushed(
     steps
         Integration steps per tick.
     out
-        Position, velocity and actuator force, written, shape (3, ticks).
+        Position, velocity, actuator force and command, shape (4, ticks). The command is read where
+        the loop is open, and all else is written.
     """
-    # One kernel on purpose: parts of their own would pass and return a dozen scalars of state in
-    # every step.
-    h = period / steps
-    x, v = start
-    slider, viscous, force = x, damping(guide, v) * v, 0.0
-    # A servo's conditioned command is a position, a force actuator's a force.
-    follows, wanted, held_by = law.position_gain > 0.0, held.memory[3], 0.0
-    half = 0.5 * guide.backlash
-    neutral = np.array([sensor.neutral for sensor in sensors])
-    share = h / (guide.relaxation + h)
-    yields = guide.mount_compliance * inertia.mass > SHORTEST * h * h
-    inner, speed = x, 0.0
-    # Reading a tuple's fields inside the loop costs more than a step.
-    sensor, recorded, noise = loop.sensor, loop.recorded, loop.noise
-    operations, registers, memory = loop.program.operations, loop.registers, loop.memory
-    for tick in range(len(command)):
+    h, (x, v) = guide_step.step, start
+    slider, viscous = x, damping(guide_step.guide, v) * v
+    behind = MountState(x, 0.0, slider, viscous)
+    law, mass = drive.law, inertia.mass
+    follows = law.position_gain > 0.0
+    # What the step before leaves: a servo's conditioned command, or a force actuator's force.
+    last = drive.held.memory[3] if follows else 0.0
+    # A mount whose oscillation with the mass is faster than the step, c·m < h², counts as rigid.
+    yields = guide_step.guide.mount_compliance * mass > SHORTEST * h * h
+    for tick in range(len(disturbance)):
         # Sensors read before the tick's command acts.
         out[0, tick], out[1, tick] = x, v
-        out[2, tick] = push(law, wanted, x, v) if follows else force
+        out[2, tick] = push(law, last, x, v) if follows else last
         if loop.closed:
-            for number in range(len(sensor)):
-                source = sensor[number]
-                registers[number] = recorded[tick, number]
-                if source >= 0:
-                    true = x if kinds[source] == 0 else v
-                    # A neutral sensor is skipped: reading it from the tuple costs more than the
-                    # rest of a tick.
-                    sensed = (
-                        true
-                        if neutral[source]
-                        else transduce(sensors[source], states[source], true)
-                    )
-                    registers[number] = sensed + noise[tick, number]
-            command[tick] = run(operations, registers, memory, period)
+            out[3, tick] = compute_command(loop, tick, x, v, period)
         for _ in range(steps):
-            if follows:
-                before, wanted = wanted, condition(drive, held, command[tick])
-                pushed, held_by = pull(law, 0.5 * (before + wanted), x), law.damping_gain
-                if abs(pushed - held_by * v) > law.limit:
-                    # A saturated servo has a constant force, so it damps nothing.
-                    pushed, held_by = math.copysign(law.limit, pushed - held_by * v), 0.0
-            else:
-                earlier = force
-                force = push(law, condition(drive, held, command[tick]), x, v)
-                pushed = 0.5 * (earlier + force)
+            pushed, held_by, last = push_joint(drive, out[3, tick], last, x, v)
+            outer = pushed + disturbance[tick] - gravity(inertia, x)
             if yields:
-                place, slider, viscous, held_back = give_way(
-                    guide=guide,
-                    dry_friction=dry_friction,
-                    spring=spring,
-                    rest=inertia.rest,
-                    share=share,
-                    period=h,
-                    inner=inner,
-                    speed=speed,
-                    slider=slider,
-                    viscous=viscous,
-                    load=pushed,
-                    outer=x,
-                )
-                speed, inner = (place - inner) / h, place
-                load = pushed + disturbance[tick] - gravity(inertia, x) - held_back
-                v = (v + h * load / inertia.mass) / (1.0 + h * held_by / inertia.mass)
+                behind, held_back = give_way(guide_step, behind, pushed, x)
+                # The mount decouples the guide, whose force is therefore explicit; only a servo's
+                # damping is implicit.
+                v = (v + h * (outer - held_back) / mass) / (1.0 + h * held_by / mass)
                 x += h * v
-                continue
-            coefficient = damping(guide, v)
-            # The velocity step is centred on this position: half of it passes under the old
-            # command and half under the new one, which is why `pushed` is their mean.
-            load = (
-                pushed
-                + disturbance[tick]
-                - gravity(inertia, x)
-                - position_force(guide, x, inertia.rest)
-                - (1.0 - share) * viscous
-            )
-            damped = h * (share * coefficient + guide.drag * abs(v) + held_by)
-            # Implicit share of the damping: the midpoint rule's ½ until d·h = 2m, where it would
-            # start to oscillate, and more beyond.
-            ahead = 1.0 - inertia.mass / damped if damped > 2.0 * inertia.mass else 0.5
-            total = inertia.mass + ahead * damped
-            rhs = (inertia.mass - (1.0 - ahead) * damped) * v + h * load
-            forward, backward = dry_limits(dry_friction, v, pushed)
-            # Without dry friction; then with a stretched spring; then with a slider that slides.
-            velocity = rhs / total
-            stretch_length = x + h * velocity - slider
-            if stretch_length > half or stretch_length < -half:
-                edge = math.copysign(half, stretch_length)
-                velocity = (rhs - h * spring * (x - slider - edge)) / (total + h * h * spring)
-                dry, by = slide(x + h * velocity - slider, half, spring, forward, backward)
-                if by != 0.0:
-                    velocity = (rhs - h * dry) / total
-                    slider = x + h * velocity - edge - dry / spring
-            between = ahead * velocity + (1.0 - ahead) * v
-            viscous += share * (coefficient * between - viscous)
-            v = velocity
-            x += h * v
+            else:
+                x, v, slider, viscous = step_joint(
+                    guide_step, mass, (x, v, slider, viscous), pushed, held_by, outer
+                )

@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from rigtwin.components import measures
-from rigtwin.components.sensors import apply_sensor
+from rigtwin.components.sensors import apply_sensor, sensor_of
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Machine, ReplayOf, Row
 from rigtwin.models.inputs import inputs_of_test
 from rigtwin.models.inverse_twin import SimulatedSignals
-from rigtwin.models.joint import JointModel
+from rigtwin.models.joint import PLACES
+from rigtwin.models.joint_simulation import JointSimulation
 from rigtwin.models.reading import sensors_of
 from rigtwin.numerics.arrays import Array, has_diverged
 
@@ -43,20 +43,19 @@ def simulate_joint(
     (mover,) = replay.moved_by
     rows = []
     for name in sensors_of(machine):
-        channel = components[name].channel
-        if components[name].joint == replay.joint.name and channel is not None:
-            rows.append(Row(name, measures(getattr(plant, name)), channel, components[name].unit))
+        known = components[name]
+        if known.joint == replay.joint.name and known.channel is not None:
+            rows.append(Row(name, known.quantity, known.channel, known.unit))
     no_signal = {row.name: np.zeros(len(demands[mover])) for row in rows}
     inputs = inputs_of_test(machine, {**no_signal, **demands}, period)
     observed = replace(replay, rows=tuple(rows))
-    model = JointModel(machine, observed, inputs, configuration, configuration.substeps)
-    if measures(getattr(plant, mover)):
-        moved = model.prescribe(plant, demands[mover])
+    joint = JointSimulation(machine, observed, inputs, configuration, configuration.substeps)
+    if components[mover].quantity:
+        moved = joint.prescribe(plant, demands[mover])
     else:
-        moved = model.move(plant)
-    places = {"position": 0, "velocity": 1, "force": 2}
+        moved = joint.move(plant)
     readings = {
-        row.name: apply_sensor(getattr(plant, row.name), moved[places[row.kind]], period)
+        row.name: apply_sensor(sensor_of(plant, row.name), moved[PLACES[row.kind]], period)
         for row in rows
     }
     return SimulatedSignals(readings, not has_diverged(moved))

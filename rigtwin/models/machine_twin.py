@@ -16,13 +16,7 @@ from rigtwin.description.limits import LimitTrip, find_trip, require_order
 from rigtwin.description.machine import OWN, Machine, ReplayOf
 from rigtwin.errors import RigtwinError
 from rigtwin.models.commanding import Command, Tick, command_by_formula, command_by_function
-from rigtwin.models.demands import (
-    Columns,
-    check_demands,
-    list_movers,
-    list_sensors,
-    list_wanted,
-)
+from rigtwin.models.demands import Columns, check_demands, list_movers, list_sensors, list_wanted
 from rigtwin.models.forward_twin import list_parts, simulate_controlled, simulate_forward
 from rigtwin.models.inverse_twin import SimulatedSignals, simulate_prescribed
 from rigtwin.models.joint_twin import simulate_joint

@@ -71,12 +71,14 @@ def find_terms(bodies: Bodies, place: Array, speed: Array, inertia: Array, bias:
     bias
         Bias, written, N, shape (coordinates,).
     """
+    size = len(place)
     # Constant terms need no call of MuJoCo.
     if bodies.steady:
-        inertia[:] = bodies.inertia + bodies.added
-        bias[:] = bodies.constant
+        for i in range(size):
+            bias[i] = bodies.constant[i]
+            for j in range(size):
+                inertia[i, j] = bodies.inertia[i, j] + bodies.added[i, j]
         return
-    size = len(place)
     for joint in range(len(bodies.dofs)):
         at, rate = bodies.base[joint], 0.0
         for coordinate in range(size):

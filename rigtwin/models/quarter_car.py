@@ -16,18 +16,17 @@ from controllers import Measurements
 from controllers.force import MOTOR_CONSTANT
 from rigtwin.components import Computer, Cylinder, RigPlant
 from rigtwin.components.effect import Motion
+from rigtwin.components.plant import select
 from rigtwin.components.sensors import apply_sensor
 from rigtwin.description.configuration import Configuration
 from rigtwin.models.basis import Passage, forms
 from rigtwin.models.model import Form, Model
 from rigtwin.models.quarter_car_motion import PlateMotion, move_carriage, move_plate
 from rigtwin.numerics.arrays import Array, clip_diverged
+from rigtwin.numerics.memo import Memo
 from rigtwin.recording import Inputs
 from rigtwin.simulation.converters import sensors
-from rigtwin.simulation.plant import (
-    initial_deflection,
-    initial_yield,
-)
+from rigtwin.simulation.plant import initial_deflection, initial_yield
 
 COMPONENTS = (
     "motor",
@@ -95,13 +94,12 @@ class QuarterCarModel(Model[RigPlant]):
             np.ascontiguousarray(c) for c in (ground, structure, voltage)
         )
         self._configuration = configuration
-        self._start, self._preload = (
-            configuration.controller.start,
-            configuration.controller.preload,
-        )
+        self._start = configuration.controller.start
+        self._preload = configuration.controller.preload
         self._period, self._steps = configuration.timing.period, steps
-        self._last: dict[tuple[object, ...], Array] = {}
-        self._plates: dict[tuple[object, ...], PlateMotion] = {}
+        # Effects at sensors leave the mechanics as they are: the last motions serve again.
+        self._last: Memo[Array] = Memo(KEPT_MOTIONS)
+        self._plates: Memo[PlateMotion] = Memo(KEPT)
 
     @classmethod
     def of(cls, inputs: Inputs, configuration: Configuration, steps: int) -> QuarterCarModel:
@@ -128,18 +126,15 @@ class QuarterCarModel(Model[RigPlant]):
 
     def halve_steps(self) -> QuarterCarModel:
         """Return the model with half the integration steps."""
-        return QuarterCarModel(
-            self._ground,
-            self._structure,
-            self._voltage,
-            self._configuration,
-            max(1, self._steps // 2),
-        )
+        return self._with_steps(max(1, self._steps // 2))
 
     def double_steps(self) -> QuarterCarModel:
         """Return the model with twice the integration steps."""
+        return self._with_steps(2 * self._steps)
+
+    def _with_steps(self, steps: int) -> QuarterCarModel:
         return QuarterCarModel(
-            self._ground, self._structure, self._voltage, self._configuration, 2 * self._steps
+            self._ground, self._structure, self._voltage, self._configuration, steps
         )
 
     def _plate(
@@ -154,21 +149,10 @@ class QuarterCarModel(Model[RigPlant]):
         # A plate's yielding depends on its load and is left to the carriage's motion.
         unloaded = cylinder._replace(compliance=0.0, yield_lag=0.0, zero_load=0.0)
         key = (unloaded, computer.delay, id(commands), position)
-        plate = self._plates.get(key)
-        if plate is None:
-            if len(self._plates) > KEPT:
-                self._plates.clear()
-            plate = move_plate(
-                cylinder=unloaded,
-                computer=computer,
-                commands=commands,
-                start=start,
-                at=position,
-                timestep=self._period / self._steps,
-                steps=self._steps,
-            )
-            self._plates[key] = plate
-        return plate
+        h, steps = self._period / self._steps, self._steps
+        return self._plates.recall(
+            key, lambda: move_plate(unloaded, computer, commands, start, position, h, steps)
+        )
 
     def predict_true(self, plant: RigPlant, disturbances: Disturbances | None = None) -> Array:
         """Return what ideal sensors would read, rows as in `Measurements`, shape (4, ticks).
@@ -192,10 +176,8 @@ class QuarterCarModel(Model[RigPlant]):
         )
         zero = np.zeros_like(self._voltage)
         disturbances = disturbances or Disturbances(zero, zero, zero, zero)
-        ground, structure = (
-            self._displace(ground, disturbances.ground),
-            self._displace(structure, disturbances.structure),
-        )
+        ground = self._displace(ground, disturbances.ground)
+        structure = self._displace(structure, disturbances.structure)
         out = move_carriage(
             plant=plant,
             plates=(ground, structure),
@@ -235,13 +217,7 @@ class QuarterCarModel(Model[RigPlant]):
             return sensed
         amounts = dict.fromkeys(Disturbances._fields, np.zeros_like(amount))
         amounts[entry] = amount / MOTOR_CONSTANT if entry == "voltage" else amount
-        true = self.predict_true(plant, Disturbances(**amounts))
-        return np.stack(
-            [
-                apply_sensor(sensor, row, self._period)
-                for sensor, row in zip(sensors(plant), true, strict=True)
-            ]
-        )
+        return self._sense(plant, self.predict_true(plant, Disturbances(**amounts)))
 
     def components(self) -> tuple[str, ...]:
         return COMPONENTS
@@ -289,15 +265,10 @@ class QuarterCarModel(Model[RigPlant]):
 
     def predict(self, plant: RigPlant) -> Array:
         """Return the sensors' readings without noise and quantisation, shape (4, ticks)."""
-        mechanical = tuple(getattr(plant, name) for name in MECHANICAL)
-        true = self._last.get(mechanical)
-        if true is None:
-            true = self.predict_true(plant)
-            # Effects at sensors leave the mechanics as they are: the last motions serve again.
-            self._last = {**dict(list(self._last.items())[-KEPT_MOTIONS:]), mechanical: true}
-        return np.stack(
-            [
-                apply_sensor(sensor, row, self._period)
-                for sensor, row in zip(sensors(plant), true, strict=True)
-            ]
-        )
+        mechanical = select(plant, MECHANICAL)
+        true = self._last.recall(mechanical, lambda: self.predict_true(plant))
+        return self._sense(plant, true)
+
+    def _sense(self, plant: RigPlant, true: Array) -> Array:
+        readings = zip(sensors(plant), true, strict=True)
+        return np.stack([apply_sensor(sensor, row, self._period) for sensor, row in readings])

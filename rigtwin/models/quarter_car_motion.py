@@ -19,8 +19,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from controllers.compiled import compilable
-from rigtwin.components import Computer, Cylinder, Motor, RigPlant
+from controllers.compiled import compilable, inlined
+from rigtwin.components import Computer, Cylinder, RigPlant
 from rigtwin.components.conditioning import Actuator, ActuatorState, actuator, condition, hold
 from rigtwin.components.cylinder import (
     CylinderModel,
@@ -32,10 +32,10 @@ from rigtwin.components.cylinder import (
 )
 from rigtwin.components.gas_spring import spring_force
 from rigtwin.components.guide import breakaway
-from rigtwin.components.yielding import share_of_load, solve_yielding
+from rigtwin.components.yielding import Rod, share_of_load, solve_yielding
 from rigtwin.numerics.arrays import Array
-from rigtwin.numerics.compiling import kernel
-from rigtwin.simulation.plant import RigContacts, contacts, stiffness_ratio
+from rigtwin.numerics.compiling import kernel, loop_kernel
+from rigtwin.simulation.plant import RigContacts, cogging_force, contacts, stiffness_ratio
 
 
 class PlateMotion(NamedTuple):
@@ -46,15 +46,22 @@ class PlateMotion(NamedTuple):
 
 
 class CarriageConstants(NamedTuple):
-    """Constants of the carriage's equation of motion, except those of its contacts."""
+    """Constants of the carriage's equation of motion, except those of its contacts.
+
+    What a step would have to divide for is divided here: a division costs as much as all else of
+    the step.
+    """
 
     timestep: float  # Integration step, s.
+    rate: float  # Steps per second, 1/s.
     mass: float  # Mass of the carriage, kg.
     rail_viscous: float  # Viscous friction of the rail, Ns/m.
     motor_viscous: float  # Viscous friction between motor and carriage, Ns/m.
     motor_constant: float  # Force per unit of voltage, N/V.
     motor_share: float  # Share of a force step that the motor covers in a timestep.
     voltage_limit: float  # Largest voltage of the amplifier, V.
+    shares: tuple[float, float]  # Yielding of ground and structure plate per load, m/(Ns).
+    fades: tuple[float, float]  # Rates at which the plates lose their yield, 1/s.
 
 
 @kernel
@@ -205,129 +212,173 @@ def motor_friction(
     return min(max(unbalanced, -motor[1]), motor[0])
 
 
-@kernel
+@inlined
+def plate_velocity(plate: PlateMotion, tick: int, place: int, trial: bool, rate: float) -> float:
+    """Return the unloaded velocity of a plate over the step from `place`, m/s.
+
+    `trial` asks for the step from a tick under the commands before it; `rate` is 1/step, 1/s.
+    """
+    ahead = plate.onward[tick] if trial else plate.position[place + 1]
+    return (ahead - plate.position[place]) * rate
+
+
+@inlined
+def friction_limits(
+    now: RigContacts, x: float, v: float, travel: float, sliding: float, load: float
+) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Return the limits of the rail's and the motor's dry friction, N.
+
+    Each pair holds against positive and negative motion: of the carriage (x, v), and of the
+    structure plate relative to it (travel, sliding).
+    """
+    if not now.changing:
+        rail, motor = now.rail.coulomb, now.motor.coulomb
+        return (rail, rail), (motor, motor)
+    rail_limits = breakaway(now.rail, now.rail_gap, x, v, load)
+    return rail_limits, breakaway(now.motor, now.motor_gap, travel, sliding, load)
+
+
+@inlined
+def press_tyre(
+    now: RigContacts, deflection: float, ground_loss: float, share: float, h: float
+) -> tuple[float, float]:
+    """Return spring force, N, and damping, Ns/m, of the tyre: F = spring + damping·(z_g' − v).
+
+    The tyre's F = k·δ + d·(z_g' − v) is implicit in v. A ground plate that yields by `share`·F
+    takes a part of the deflection, which divides the force by `loading`.
+    """
+    if not deflection > 0.0:
+        return 0.0, 0.0
+    ratio = stiffness_ratio(now, deflection)
+    loading = 1.0 + share * (h * now.stiffness * ratio + now.damping)
+    spring = now.stiffness * (deflection + h * ground_loss) * ratio / loading
+    return spring, now.damping / loading
+
+
+class CarriageForces(NamedTuple):
+    """Forces on the carriage over one step, and velocities of the plates."""
+
+    momentum: float  # Momentum before the step, Ns.
+    motor: float  # Motor force without cogging and friction, N.
+    cogging: float  # Cogging of the motor, N.
+    gas: float  # Force of the gas spring, N.
+    pushed: float  # Unmodelled force, N.
+    rail: tuple[float, float]  # Limits of the rail's dry friction, N.
+    rod: tuple[float, float]  # Limits of the motor's dry friction, N.
+    spring: float  # Spring force of the tyre, N.
+    damping: float  # Damping of the tyre, Ns/m.
+    ground: float  # Velocity of the ground plate without load, m/s.
+    structure: float  # Velocity of the structure plate without load and yielding, m/s.
+    loss: float  # Velocity at which the structure plate loses its yield, m/s.
+
+
+@inlined
+def solve_step(
+    carriage: CarriageConstants, forces: CarriageForces, yields: bool
+) -> tuple[float, float, float]:
+    """Solve one step for the carriage's velocity, m/s, the load cell's and the tyre's force, N.
+
+    `yields` tells whether the structure plate yields to its load. The motor's force and friction
+    act on the carriage through the load cell; a gas spring beside it does not.
+    """
+    h, force, bias, gas = carriage.timestep, forces.motor, forces.cogging, forces.gas
+    plate, spring, damping = forces.structure, forces.spring, forces.damping
+    # Limits of friction as impulses over the step, Ns, as the inclusion is one of momentum.
+    rail = h * forces.rail[0], h * forces.rail[1]
+    motor = h * forces.rod[0], h * forces.rod[1]
+    inertia = carriage.mass + h * (carriage.rail_viscous + carriage.motor_viscous)
+    free = forces.momentum + h * (
+        carriage.motor_viscous * plate - force - bias - gas + forces.pushed
+    )
+    velocity = cell = tyre = 0.0
+    # A tyre does not pull: where it would, the step is solved again without contact.
+    for _ in range(2):
+        push, resisted = h * (spring + damping * forces.ground), h * damping
+        if yields:
+            velocity, cell = solve_yielding(
+                rod=Rod(
+                    free=plate + forces.loss,
+                    share=carriage.shares[1],
+                    force=force + bias,
+                    viscous=carriage.motor_viscous,
+                    forward=forces.rod[0],
+                    backward=forces.rod[1],
+                ),
+                rhs=forces.momentum + h * (forces.pushed - gas) + push,
+                inertia=carriage.mass + h * carriage.rail_viscous + resisted,
+                timestep=h,
+                rail=rail,
+            )
+        else:
+            rhs, total = free + push, inertia + resisted
+            velocity = solve_velocity(rhs, total, rail, motor, plate)
+            dry = motor_friction(rhs, total, rail, motor, plate, velocity) * carriage.rate
+            cell = force + bias - dry - carriage.motor_viscous * (plate - velocity)
+        tyre = spring + damping * (forces.ground - velocity)
+        if tyre >= 0.0:
+            break
+        spring = damping = 0.0
+    return velocity, cell, tyre
+
+
+@loop_kernel
 def _mechanics(
     carriage: CarriageConstants,
     now: RigContacts,
-    motor_drive: Actuator,
-    motor_command: ActuatorState,
+    drive: tuple[Actuator, ActuatorState],
     start: float,
     preload: float,
     steps: int,
-    ground: Array,
-    ground_onward: Array,
-    structure: Array,
-    structure_onward: Array,
+    plates: tuple[PlateMotion, PlateMotion],
     voltage: Array,
     pushed: Array,
     out: Array,
 ) -> None:
     """Integrate the carriage between its plates.
 
-    Plates, voltage (V) and `pushed`, an unmodelled force on the carriage (N), are those of
-    `move_carriage`. The readings of ideal sensors are written to `out`, shape (4, ticks).
+    `drive` conditions the voltage, V. Arguments are else those of `move_carriage`. The readings of
+    ideal sensors are written to `out`, shape (4, ticks).
     """
-    # One kernel on purpose: parts of their own would pass and return two dozen scalars in every
-    # step.
-    h = carriage.timestep
-    x, v, force = start, 0.0, preload
-    yielding = 0.0
-    inertia = carriage.mass + h * (carriage.rail_viscous + carriage.motor_viscous)
-    # Divisions and tuple fields are taken out of the loop: there they double the cost of a step.
-    rate, yielded, changing = 1.0 / h, now.yielded, now.changing
-    ground_fades, structure_fades = 1.0 / (now.ground_lag + h), 1.0 / (now.structure_lag + h)
-    ground_share = share_of_load(now.ground_compliance, now.ground_lag, h)
-    structure_share = share_of_load(now.structure_compliance, now.structure_lag, h)
+    (ground, structure), yielded, h = plates, now.yielded, carriage.timestep
+    x, v, force, yielding = start, 0.0, preload, 0.0
     for tick in range(len(voltage)):
         for step in range(-1, steps):
             # Step −1 is a trial under the old commands: the sensors read the force before the
             # tick's commands act. It is not integrated.
             place = tick * steps + max(step, 0)
-            ground_here, structure_here = ground[place], structure[place]
-            if step < 0:
-                ground_there, structure_there = ground_onward[tick], structure_onward[tick]
-            else:
-                ground_there, structure_there = ground[place + 1], structure[place + 1]
-            plate_velocity = (structure_there - structure_here) * rate
-            ground_velocity = (ground_there - ground_here) * rate
-            structure_now, ground_now = structure_here + yielded[1], ground_here + yielded[0]
-            # Rate at which a yielded plate would return without load, m/s.
-            ground_loss = (now.ground_unloaded - yielded[0]) * ground_fades
-            structure_loss = (now.structure_unloaded - yielded[1]) * structure_fades
-            ground_velocity += ground_loss
-            travel = structure_now - x
-            deflection = ground_now - x
-            rail, motor = (
-                (h * now.rail.coulomb, h * now.rail.coulomb),
-                (h * now.motor.coulomb, h * now.motor.coulomb),
+            structure_now = structure.position[place] + yielded[1]
+            ground_now = ground.position[place] + yielded[0]
+            ground_loss = (now.ground_unloaded - yielded[0]) * carriage.fades[0]
+            structure_loss = (now.structure_unloaded - yielded[1]) * carriage.fades[1]
+            plate = plate_velocity(structure, tick, place, step < 0, carriage.rate)
+            travel, deflection = structure_now - x, ground_now - x
+            rail, rod = friction_limits(now, x, v, travel, plate + yielding - v, force)
+            spring, damping = press_tyre(now, deflection, ground_loss, carriage.shares[0], h)
+            forces = CarriageForces(
+                momentum=carriage.mass * v,
+                motor=force,
+                cogging=cogging_force(now, travel),
+                gas=spring_force(now.gas, -travel) if now.gas.force > 0.0 else 0.0,
+                pushed=pushed[tick],
+                rail=rail,
+                rod=rod,
+                spring=spring,
+                damping=damping,
+                ground=plate_velocity(ground, tick, place, step < 0, carriage.rate) + ground_loss,
+                structure=plate,
+                loss=structure_loss,
             )
-            bias = gas = 0.0
-            forward = backward = now.motor.coulomb
-            if changing:
-                forward, backward = breakaway(now.rail, now.rail_gap, x, v, force)
-                rail = (h * forward, h * backward)
-                forward, backward = breakaway(
-                    now.motor, now.motor_gap, travel, plate_velocity + yielding - v, force
-                )
-                motor = (h * forward, h * backward)
-                if now.cogging != 0.0:
-                    bias = now.cogging * math.sin(
-                        2.0 * math.pi * travel / now.cogging_pitch + now.cogging_phase
-                    )
-            # The motor's force and friction act on the carriage through the load cell, a gas spring
-            # beside it does not.
-            if now.gas.force > 0.0:
-                gas = spring_force(now.gas, -travel)
-            free = carriage.mass * v + h * (
-                carriage.motor_viscous * plate_velocity - force - bias - gas + pushed[tick]
-            )
-            spring = damping = 0.0
-            if deflection > 0.0:
-                # Tyre: F = k·δ + d·(z_g' − v), implicit in v. A ground plate that yields by
-                # share·F takes a part of the deflection, which divides the force by `loading`.
-                ratio = stiffness_ratio(now, deflection)
-                loading = 1.0 + ground_share * (h * now.stiffness * ratio + now.damping)
-                spring = now.stiffness * (deflection + h * ground_loss) * ratio / loading
-                damping = now.damping / loading
-            while True:
-                push, resisted = h * (spring + damping * ground_velocity), h * damping
-                if now.structure_compliance > 0.0:
-                    velocity, cell = solve_yielding(
-                        rhs=carriage.mass * v + h * (pushed[tick] - gas) + push,
-                        inertia=carriage.mass + h * carriage.rail_viscous + resisted,
-                        timestep=h,
-                        rail=rail,
-                        free=plate_velocity + structure_loss,
-                        share=structure_share,
-                        force=force + bias,
-                        viscous=carriage.motor_viscous,
-                        forward=forward,
-                        backward=backward,
-                    )
-                else:
-                    rhs, total = free + push, inertia + resisted
-                    velocity = solve_velocity(rhs, total, rail, motor, plate_velocity)
-                    dry = motor_friction(rhs, total, rail, motor, plate_velocity, velocity) * rate
-                    cell = force + bias - dry - carriage.motor_viscous * (plate_velocity - velocity)
-                tyre = spring + damping * (ground_velocity - velocity)
-                if tyre >= 0.0:
-                    break
-                # A tyre does not pull: solve again without contact.
-                spring = damping = 0.0
+            velocity, cell, tyre = solve_step(carriage, forces, now.structure_compliance > 0.0)
             if step < 0:
-                out[0, tick], out[1, tick], out[2, tick], out[3, tick] = (
-                    ground_now,
-                    structure_now,
-                    travel,
-                    cell,
-                )
+                out[0, tick], out[1, tick] = ground_now, structure_now
+                out[2, tick], out[3, tick] = travel, cell
                 continue
-            yielding = structure_loss + structure_share * cell
-            yielded[0] += h * (ground_loss - ground_share * tyre)
+            yielding = structure_loss + carriage.shares[1] * cell
+            yielded[0] += h * (ground_loss - carriage.shares[0] * tyre)
             yielded[1] += h * yielding
-            drive_voltage = condition(motor_drive, motor_command, voltage[tick])
-            drive_voltage = min(max(drive_voltage, -carriage.voltage_limit), carriage.voltage_limit)
-            force += carriage.motor_share * (carriage.motor_constant * drive_voltage - force)
+            amplified = condition(drive[0], drive[1], voltage[tick])
+            amplified = min(max(amplified, -carriage.voltage_limit), carriage.voltage_limit)
+            force += carriage.motor_share * (carriage.motor_constant * amplified - force)
             v = velocity
             x += h * v
 
@@ -383,9 +434,13 @@ def follow_plates(
 
 def _arrange_carriage(plant: RigPlant, timestep: float) -> CarriageConstants:
     """Return the constants of the carriage's equation of motion."""
-    motor: Motor = plant.motor
+    motor, cylinders = plant.motor, (plant.ground_cylinder, plant.structure_cylinder)
+    ground, structure = (
+        share_of_load(cylinder.compliance, cylinder.yield_lag, timestep) for cylinder in cylinders
+    )
     return CarriageConstants(
         timestep=timestep,
+        rate=1.0 / timestep,
         mass=plant.carriage.mass,
         rail_viscous=plant.rail.viscous,
         motor_viscous=motor.viscous,
@@ -393,6 +448,11 @@ def _arrange_carriage(plant: RigPlant, timestep: float) -> CarriageConstants:
         # Exact solution of the amplifier's first-order lag over a step.
         motor_share=1.0 - math.exp(-timestep / motor.time_constant),
         voltage_limit=min(motor.voltage_limit, motor.force_limit / motor.constant),
+        shares=(ground, structure),
+        fades=(
+            1.0 / (cylinders[0].yield_lag + timestep),
+            1.0 / (cylinders[1].yield_lag + timestep),
+        ),
     )
 
 
@@ -433,22 +493,16 @@ def move_carriage(
     array
         Readings of ideal sensors, rows as in `Measurements`, shape (4, ticks).
     """
-    motor: Motor = plant.motor
-    carriage = _arrange_carriage(plant, timestep)
+    conditioning = actuator(plant.motor, plant.computer, timestep)
     out = np.empty((4, len(voltage)))
-    ground, structure = plates
     _mechanics(
-        carriage=carriage,
+        carriage=_arrange_carriage(plant, timestep),
         now=contacts(plant, start, travel, preload),
-        motor_drive=actuator(motor, plant.computer, timestep),
-        motor_command=hold(actuator(motor, plant.computer, timestep), preload / motor.constant),
+        drive=(conditioning, hold(conditioning, preload / plant.motor.constant)),
         start=start,
         preload=preload,
         steps=steps,
-        ground=ground.position,
-        ground_onward=ground.onward,
-        structure=structure.position,
-        structure_onward=structure.onward,
+        plates=plates,
         voltage=np.ascontiguousarray(voltage),
         pushed=np.ascontiguousarray(pushed),
         out=out,

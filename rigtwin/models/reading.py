@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigtwin.components import measures
 from rigtwin.components.plant import Plant
+from rigtwin.components.sensors import sensor_of
 from rigtwin.description.machine import Machine
 from rigtwin.numerics.arrays import Array
 
@@ -15,7 +15,7 @@ def sensors_of(machine: Machine) -> list[str]:
     return [
         name
         for name, component in machine.components.items()
-        if measures(getattr(machine.plant, name)) and component.channel is not None
+        if component.quantity and component.channel is not None
     ]
 
 
@@ -44,15 +44,15 @@ def make_noise(
     """
     # The order of the draws, phase first, keeps recordings of a seed the same.
     hum = hum_of(plant, name, random.uniform(0.0, 2.0 * np.pi), period * np.arange(ticks))
-    return getattr(plant, name).white * random.standard_normal(ticks) + hum
+    return sensor_of(plant, name).white * random.standard_normal(ticks) + hum
 
 
 def hum_of(plant: Plant, name: str, phase: float, time: Array) -> Array:
     """Return the mains hum of a sensor at times in s: hum·sin(2π·f·time + phase)."""
-    return getattr(plant, name).hum * np.sin(2.0 * np.pi * plant.mains.frequency * time + phase)
+    return sensor_of(plant, name).hum * np.sin(2.0 * np.pi * plant.mains.frequency * time + phase)
 
 
 def round_reading(plant: Plant, name: str, reading: Array) -> Array:
     """Return a reading rounded to the resolution of the sensor."""
-    bit = getattr(plant, name).resolution
+    bit = sensor_of(plant, name).resolution
     return np.round(reading / bit) * bit if bit > 0.0 else reading

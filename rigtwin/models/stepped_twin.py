@@ -10,7 +10,8 @@ import numpy as np
 from rigtwin.components.conditioning import Actuator, ActuatorState, condition, hold
 from rigtwin.components.servo import Push, push
 from rigtwin.description.machine import Row
-from rigtwin.models.forward_motion import GuideContacts, State, StepInputs, advance
+from rigtwin.models.forward_arrays import GuideContacts, State, StepInputs, allocate
+from rigtwin.models.forward_motion import advance
 from rigtwin.models.multibody import Bodies
 from rigtwin.numerics.arrays import Array
 
@@ -119,6 +120,8 @@ class SteppedTwin:
             servos=inputs.servos._replace(commands=np.zeros((len(inputs.servos.laws), two))),
         )
         self._out = np.zeros((3, size, 2))
+        self._work = allocate(size, len(free), len(contacts.springs), len(self._laws))
+        # Where nothing but commands moves the machine, no input needs to be looked up.
         movers = len(inputs.pushes) + len(inputs.servos.laws)
         self._foretold = len(held) > 0 or movers > len(self._drives)
 
@@ -193,6 +196,7 @@ class SteppedTwin:
             held=self._held,
             state=self._state,
             inputs=window,
+            work=self._work,
             h=self._h,
             steps=steps,
             first=1,

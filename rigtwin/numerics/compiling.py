@@ -83,7 +83,20 @@ def kernel(function: Function) -> Function:
     Compiled code uses no Python objects, releases the interpreter lock, and is cached on disk. A
     division by zero gives numpy's result instead of an exception.
     """
-    compiled: Any = numba.njit(nogil=True, error_model="numpy")(function)
+    return _compile(function, {})
+
+
+def loop_kernel(function: Function) -> Function:
+    """Compile a function as `kernel` does, for a loop that allocates nothing.
+
+    Its arrays belong to its caller, so their references need no counting. Counting them takes
+    longer than the arithmetic of a step wherever a tuple of arrays is passed on.
+    """
+    return _compile(function, {"_nrt": False})
+
+
+def _compile(function: Function, options: dict[str, bool]) -> Function:
+    compiled: Any = numba.njit(nogil=True, error_model="numpy", **options)(function)
     if _CACHE is None:
         return cast(Function, compiled)
     # numba reads the folder when the cache object is made, so it is set only for that moment.

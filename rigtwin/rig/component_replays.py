@@ -10,7 +10,7 @@ import numpy as np
 
 from controllers import Commands, Measurements
 from rigtwin.components.gas_spring import spring_force
-from rigtwin.components.sensors import apply_sensor, remove_drift, undo_sensor
+from rigtwin.components.sensors import apply_sensor, remove_drift, sensor_of, undo_sensor
 from rigtwin.components.yielding import yield_to_load
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.control import RigControl
@@ -69,19 +69,21 @@ class ComponentReplays:
         return self.recording.column("/command", name)
 
     def _clean(self, signal: Array) -> Array:
+        # The line of the mains is not white: it would count as a gap of every component.
         return remove_mains(signal, self.period, self.configuration.plant.mains.frequency)
 
     def _without_zero(self, name: str) -> Array:
         """Return a sensor's reading without mains hum, offset and drift."""
-        sensor = getattr(self.configuration.plant, name)
+        sensor = sensor_of(self.configuration.plant, name)
         return remove_drift(sensor, self._clean(self._sensor(name)), self.period) - sensor.offset
 
     def _apply_sensor(self, name: str, true: Array) -> Array:
         """Return the reading of the twin's sensor of that name for a true signal."""
-        return apply_sensor(getattr(self.configuration.plant, name), true, self.period)
+        return apply_sensor(sensor_of(self.configuration.plant, name), true, self.period)
 
     def _apply_lvdts(self, wheel: Array) -> Array:
         """Return the difference of both LVDTs' readings for a true wheel position, m."""
+        # The wheel has no sensor: its reading is a difference, with the errors of both LVDTs.
         plate = self.structure_motion.position
         return self._apply_sensor("structure_lvdt", plate) - self._apply_sensor(
             "suspension_lvdt", plate - wheel
@@ -90,7 +92,7 @@ class ComponentReplays:
     def _motion(self, name: str, expected: Array) -> EstimatedMotion:
         """Return the true motion behind a sensor's reading, from a replay's prediction of it."""
         # The sensor is inverted for the correction alone, so the prediction keeps its sharp parts.
-        sensor = getattr(self.configuration.plant, name)
+        sensor = sensor_of(self.configuration.plant, name)
         mains = self.configuration.plant.mains.frequency
         estimate = estimate_motion(
             self._sensor(name), self._apply_sensor(name, expected), self.period, mains
@@ -116,6 +118,7 @@ class ComponentReplays:
         tyre = self.configuration.plant.tyre.stiffness * (
             self._clean(self._sensor("ground_lvdt") - self.wheel)
         )
+        # The tyre presses the ground plate down; it cannot pull it up.
         return unloaded - yield_to_load(cylinder, np.maximum(tyre, 0.0), self.period)
 
     @cached_property
@@ -148,6 +151,7 @@ class ComponentReplays:
     def carriage_output(self) -> Array:
         """Predicted position of the wheel under the measured force, m, shape (ticks,)."""
         sensor = self.configuration.plant.load_cell
+        # The cell's zero and drift are removed here, its gain, lag and delay by `undo_sensor`.
         force = undo_sensor(sensor, self._without_zero("load_cell"), self.period)
         return replay_carriage(
             self.configuration, self.ground_motion.position, force + self._gas_force(), self.preload
@@ -209,6 +213,7 @@ class ComponentReplays:
         slides = np.abs(np.gradient(travel.position, self.period)) > resolved
         if not slides.any():
             raise Undetermined("the motor never slides fast enough for its friction to be known")
+        # Cleaned over the whole test, then restricted: the mains filter needs an unbroken signal.
         difference = self._clean(measured - self._apply_sensor("load_cell", output))
         residual_rms = rms(difference[slides])
         floor = white_noise(measured)
@@ -217,6 +222,7 @@ class ComponentReplays:
             floor,
             residual_rms / floor if floor > 0 else math.inf,
             "N",
+            # Ticks at standstill count as zero in the spectrum, so that the time axis stays whole.
             band(difference * slides, self.period),
         )
 
@@ -273,6 +279,7 @@ class ComponentReplays:
 
         Where the loop has a limit cycle, twin and recording drift apart in phase.
         """
+        # Limits are off: a trip of the twin would cut the comparison short.
         truth = simulate(
             without_limits(self.configuration), self._demands(), CLOSED_LOOP_SEED
         ).truth

@@ -12,6 +12,7 @@ import numpy as np
 from controllers import Measurements
 from rigtwin.components import RigPlant, with_parameters
 from rigtwin.components.plant import Plant
+from rigtwin.components.sensors import sensor_of
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import OWN
 from rigtwin.diagnosis.evidence import Evidence
@@ -95,6 +96,7 @@ def compute_levels(
     recording, nominal = evidence.recordings[0], evidence.configurations[0]
     noisy: Any = corrected.plant
     for name, noise in zip(evidence.names, evidence.lines[0].noise, strict=True):
+        # Noise as estimated from the recording: the spectra compare motions and not noise floors.
         noisy = with_parameters(noisy, name, {"white": float(noise)})
     # Replays and closed-loop runs are independent: start all, then wait.
     with Threads() as threads:
@@ -121,6 +123,7 @@ def _component_levels(
                 continue  # A correction can make a replay undetermined; it then has no level.
         return computed
 
+    # Without a correction both are equal, and are computed once.
     computed = threads.begin(ratios, dict.fromkeys((before, after)))
 
     def finish() -> dict[str, Level]:
@@ -165,11 +168,9 @@ def _closed_loop(
 
     def finish() -> Level:
         spectra = dict(zip(runs, results, strict=True))
-        nominal_spectra, corrected_spectra, again = (
-            spectra[nominal, SEEDS[0]],
-            spectra[corrected, SEEDS[0]],
-            spectra[corrected, SEEDS[1]],
-        )
+        nominal_spectra = spectra[nominal, SEEDS[0]]
+        corrected_spectra = spectra[corrected, SEEDS[0]]
+        again = spectra[corrected, SEEDS[1]]
         # The third number is the floor: two runs of the same twin with different noise.
         return Level(
             _spectral_distance(measured, nominal_spectra),
@@ -183,10 +184,8 @@ def _closed_loop(
 def _with_noise_of(noisy: RigPlant, plant: RigPlant) -> RigPlant:
     """Return a plant with the white noise and hum of another plant's sensors."""
     for name in Measurements._fields:
-        like = getattr(noisy, name)
-        plant = plant._replace(
-            **{name: getattr(plant, name)._replace(white=like.white, hum=like.hum)}
-        )
+        like = sensor_of(noisy, name)
+        plant = with_parameters(plant, name, {"white": like.white, "hum": like.hum})
     return plant
 
 
@@ -196,6 +195,7 @@ def _run(configuration: Configuration, seed: int, demands: Array) -> Array:
 
 def _bands(signals: Array, period: float) -> Array:
     """Return the mean spectral density of each signal in logarithmic bands, shape (4, bands)."""
+    # Bands of equal width in octaves: each holds about as much of a broadband motion.
     edges = LOWEST * 2.0 ** (
         np.arange(math.ceil(BANDS_PER_OCTAVE * math.log2(HIGHEST / LOWEST)) + 1) / BANDS_PER_OCTAVE
     )

@@ -198,10 +198,8 @@ def estimate_motion(
     offset = float(np.mean(difference))
     padding = min(PADDING, len(difference) - 1)
     # Point reflection at both ends continues value and slope.
-    start, end = (
-        2 * difference[0] - difference[padding:0:-1],
-        2 * difference[-1] - difference[-2 : -2 - padding : -1],
-    )
+    start = 2 * difference[0] - difference[padding:0:-1]
+    end = 2 * difference[-1] - difference[-2 : -2 - padding : -1]
     extended = np.concatenate([start, difference, end]) - offset
     frequencies, density = spectrum(difference - offset, period)
     # One-sided density of white noise: 2 σ² Δt.

@@ -25,7 +25,7 @@ from rigtwin.numerics.arrays import Array
 
 def sensors(plant: RigPlant) -> tuple[Lvdt | LoadCell, ...]:
     """Return the plant's sensors in the order of `Measurements`."""
-    return tuple(getattr(plant, name) for name in Measurements._fields)
+    return plant.ground_lvdt, plant.structure_lvdt, plant.suspension_lvdt, plant.load_cell
 
 
 def resolutions(plant: RigPlant) -> Measurements:

@@ -107,30 +107,73 @@ def simulate_ideal(configuration: Configuration, ground: Array) -> Ideal:
     Ideal
         Motion and suspension force at every tick.
     """
-    settings, plant, period = (
-        configuration.controller,
-        configuration.plant,
-        configuration.timing.period,
-    )
+    settings, period = configuration.controller, configuration.timing.period
     body = _structure(settings)
-    count = len(body.squares)
-    on_wheel = settings.travel == Travel.WHEEL
-    size = 2 * count + (2 if on_wheel else 0)
-    k, b = settings.suspension_stiffness, settings.suspension_damping
-    sky = settings.skyhook_damping if settings.skyhook == Skyhook.ACTIVE else 0.0
-    # State z: modal displacements, modal velocities, wheel position and velocity. The rows below
-    # select position and velocity of the sprung centre and of the wheel.
+    system = _system(configuration, body)
+    count, size = len(body.squares), len(system.a)
     # Inputs u: ground, its rate, one (for constants), and the nonlinear force: that of a
     # semi-active damper less that of a gas spring.
     rate = np.diff(ground, prepend=ground[0]) / period
     inputs = np.column_stack([ground, rate, np.ones_like(ground), np.zeros_like(ground)])
+    start = np.zeros(size)
+    start[:count] = body.start
+    if system.on_wheel:
+        start[-2] = ground[0] - initial_deflection(configuration.plant, settings.preload)
+    linear = settings.skyhook != Skyhook.SEMI_ACTIVE and settings.gas_force <= 0.0
+    substeps = 1 if linear else SUBSTEPS
+    transition, step = _discretise(system.a, system.entry, period / substeps)
+    states, nonlinear = np.empty((len(ground), size)), np.zeros(len(ground))
+    position, velocity, wheel, wheel_rate = system.rows
+    _simulate(
+        settings=settings,
+        on_wheel=system.on_wheel,
+        transition=transition,
+        step=step,
+        inputs=inputs,
+        rows=np.stack([velocity, velocity - wheel_rate, position - wheel]),
+        start=start,
+        substeps=substeps,
+        states=states,
+        nonlinear=nonlinear,
+    )
+    inputs[:, 3] = nonlinear
+    return Ideal(
+        structure=states @ position,
+        velocity=states @ velocity,
+        wheel=states @ wheel if system.on_wheel else ground,
+        force=states @ system.force + inputs @ system.force_in,
+        wing=None if body.wing is None else states[:, :count] @ body.wing,
+    )
+
+
+@dataclass(frozen=True)
+class _System:
+    """Linear part z' = A·z + B·u of the ideal system.
+
+    State z: modal displacements, modal velocities, and with a wheel its position and velocity.
+    """
+
+    on_wheel: bool  # Whether the suspension stands on a wheel with a tyre.
+    a: Array  # A, shape (states, states).
+    entry: Array  # B, shape (states, 4).
+    rows: tuple[Array, Array, Array, Array]
+    """Rows that select position and velocity of the sprung centre and of the wheel."""
+    force: Array  # Suspension force by the states, shape (states,).
+    force_in: Array  # Suspension force by the inputs, shape (4,).
+
+
+def _system(configuration: Configuration, body: _Structure) -> _System:
+    """Return the equations of a body on its suspension, on the ground or on a wheel."""
+    settings, plant = configuration.controller, configuration.plant
+    on_wheel, count = settings.travel == Travel.WHEEL, len(body.squares)
+    size = 2 * count + (2 if on_wheel else 0)
+    k, b = settings.suspension_stiffness, settings.suspension_damping
+    sky = settings.skyhook_damping if settings.skyhook == Skyhook.ACTIVE else 0.0
     position, velocity, wheel, wheel_rate = (np.zeros(size) for _ in range(4))
     position[:count], velocity[count : 2 * count] = body.centre, body.centre
     # Suspension force = force · z + force_in · u, downwards on the body by −1.
-    force, force_in = (
-        -k * position - (b + sky) * velocity,
-        np.array([0.0, 0.0, settings.preload, -1.0]),
-    )
+    force = -k * position - (b + sky) * velocity
+    force_in = np.array([0.0, 0.0, settings.preload, -1.0])
     if on_wheel:
         wheel[-2], wheel_rate[-1] = 1.0, 1.0
         force += k * wheel + b * wheel_rate
@@ -143,37 +186,7 @@ def simulate_ideal(configuration: Configuration, ground: Array) -> Ideal:
         a[-1] = (-force - stiffness * wheel - damping * wheel_rate) / mass
         entry[-1] = -force_in / mass
         entry[-1, :2] += np.array([stiffness, damping]) / mass
-    start = np.zeros(size)
-    start[:count] = body.start
-    if on_wheel:
-        start[-2] = ground[0] - initial_deflection(plant, settings.preload)
-    substeps = (
-        SUBSTEPS if settings.skyhook == Skyhook.SEMI_ACTIVE or settings.gas_force > 0.0 else 1
-    )
-    transition, step = _discretise(a, entry, period / substeps)
-    states, nonlinear = np.empty((len(ground), size)), np.zeros(len(ground))
-    rows = np.stack([velocity, velocity - wheel_rate, position - wheel])
-    _simulate(
-        settings=settings,
-        on_wheel=on_wheel,
-        transition=transition,
-        step=step,
-        inputs=inputs,
-        rows=rows,
-        start=start,
-        substeps=substeps,
-        states=states,
-        nonlinear=nonlinear,
-    )
-    inputs[:, 3] = nonlinear
-    wing = None if body.wing is None else states[:, :count] @ body.wing
-    return Ideal(
-        states @ position,
-        states @ velocity,
-        states @ wheel if on_wheel else ground,
-        states @ force + inputs @ force_in,
-        wing,
-    )
+    return _System(on_wheel, a, entry, (position, velocity, wheel, wheel_rate), force, force_in)
 
 
 def _body_equations(
@@ -184,10 +197,8 @@ def _body_equations(
     a, entry = np.zeros((size, size)), np.zeros((size, 4))
     for mode in range(count):
         a[mode, count + mode] = 1.0
-        a[count + mode, mode], a[count + mode, count + mode] = (
-            -body.squares[mode],
-            -body.damping[mode],
-        )
+        a[count + mode, mode] = -body.squares[mode]
+        a[count + mode, count + mode] = -body.damping[mode]
         a[count + mode] += body.centre[mode] * force
         entry[count + mode] = body.centre[mode] * force_in
         entry[count + mode, 2] += body.weight[mode]
@@ -230,11 +241,9 @@ def _simulate(
         held[:] = inputs[tick]
         for part in range(substeps):
             if substeps > 1:
-                sprung, velocity, travel = (
-                    np.dot(rows[0], state),
-                    np.dot(rows[1], state),
-                    np.dot(rows[2], state),
-                )
+                sprung = np.dot(rows[0], state)
+                velocity = np.dot(rows[1], state)
+                travel = np.dot(rows[2], state)
                 if not on_wheel:
                     velocity, travel = velocity - held[1], travel - held[0]
                 held[3] = 0.0

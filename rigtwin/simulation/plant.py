@@ -28,7 +28,7 @@ from rigtwin.components.cylinder import (
 from rigtwin.components.gas_spring import spring_force
 from rigtwin.components.guide import Friction, breakaway, friction, gap_at
 from rigtwin.components.tyre import SCALE
-from rigtwin.components.yielding import share_of_load, solve_yielding
+from rigtwin.components.yielding import Rod, share_of_load, solve_yielding
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import forward, integrate
 from rigtwin.simulation.mechanics import Handles, build, handles
@@ -231,8 +231,9 @@ def continue_motion(before: Simulation, after: Simulation) -> None:
     """
     # The solver's warm start belongs to the state: without it the next step differs in its last
     # digits.
-    for name in ("qpos", "qvel", "act", "ctrl", "qacc_warmstart"):
-        getattr(after.data, name)[:] = getattr(before.data, name)
+    old, new = before.data, after.data
+    new.qpos[:], new.qvel[:], new.act[:], new.ctrl[:] = old.qpos, old.qvel, old.act, old.ctrl
+    new.qacc_warmstart[:] = old.qacc_warmstart
     old_state, new_state = before.state, after.state
     for old, new in (
         (old_state.ground_state, new_state.ground_state),
@@ -277,6 +278,14 @@ def stiffness_ratio(now: RigContacts, deflection: float) -> float:
 
 
 @compilable
+def cogging_force(now: RigContacts, travel: float) -> float:
+    """Return the motor's cogging at a travel of the suspension, m: N."""
+    if now.cogging == 0.0:
+        return 0.0
+    return now.cogging * math.sin(2.0 * math.pi * travel / now.cogging_pitch + now.cogging_phase)
+
+
+@compilable
 def touch(mechanics: Handles, now: RigContacts) -> None:
     """Write dry friction, cogging and tyre stiffness of the current motion into the mechanics."""
     if not now.changing:
@@ -294,8 +303,7 @@ def touch(mechanics: Handles, now: RigContacts) -> None:
         mechanics.applied[mechanics.carriage] -= spring_force(now.gas, -travel)
     forward, backward = breakaway(now.motor, now.motor_gap, travel, sliding, load)
     mechanics.motor_friction[0] = 0.5 * (forward + backward)
-    cogging = now.cogging * math.sin(2.0 * math.pi * travel / now.cogging_pitch + now.cogging_phase)
-    mechanics.motor_bias[0] = cogging + 0.5 * (backward - forward)
+    mechanics.motor_bias[0] = cogging_force(now, travel) + 0.5 * (backward - forward)
     deflection = max(mechanics.qpos[mechanics.ground] - carriage, 0.0)
     mechanics.tyre[0] = -mechanics.tyre_scale * now.stiffness * stiffness_ratio(now, deflection)
 
@@ -322,11 +330,9 @@ def give_way(
     tuple
         Yield of the ground plate and of the structure plate, m.
     """
-    h, v, place = (
-        mechanics.timestep,
-        mechanics.qvel[mechanics.carriage],
-        mechanics.qpos[mechanics.carriage],
-    )
+    h = mechanics.timestep
+    v = mechanics.qvel[mechanics.carriage]
+    place = mechanics.qpos[mechanics.carriage]
     load, inertia, tyre = motor_force(mechanics), now.mass + h * now.rail_viscous, 0.0
     deflection = mechanics.qpos[mechanics.ground] - place
     share = share_of_load(now.ground_compliance, now.ground_lag, h)
@@ -347,18 +353,8 @@ def give_way(
     load -= 0.5 * (backward - forward)
     push = tyre - (spring_force(now.gas, -travel) if now.gas.force > 0.0 else 0.0)
     free = structure + (now.structure_unloaded - now.yielded[1]) / (now.structure_lag + h)
-    _, cell = solve_yielding(
-        rhs=now.mass * v + h * push,
-        inertia=inertia,
-        timestep=h,
-        rail=(h * up, h * down),
-        free=free,
-        share=share,
-        force=load,
-        viscous=now.motor_viscous,
-        forward=forward,
-        backward=backward,
-    )
+    rod = Rod(free, share, load, now.motor_viscous, forward, backward)
+    _, cell = solve_yielding(rod, now.mass * v + h * push, inertia, h, (h * up, h * down))
     return ground_ahead, now.yielded[1] + h * (free - structure + share * cell)
 
 

@@ -88,10 +88,8 @@ def simulate(configuration: Configuration, demands: Array, seed: int) -> Simulat
         run_compiled(Twin(configuration, float(demands[0, 0]), seed), configuration, demands)
     )
     truth = np.concatenate([block.truth for block in blocks if block.truth is not None])
-    commands, measured = (
-        np.concatenate([getattr(block, name) for block in blocks])
-        for name in ("commands", "measurements")
-    )
+    commands = np.concatenate([block.commands for block in blocks])
+    measured = np.concatenate([block.measurements for block in blocks])
     return SimulationResult(commands, measured, truth, blocks[-1].trip)
 
 
@@ -166,22 +164,19 @@ def record(
         If the configuration is invalid. Nothing is written then.
     """
     actual = apply_effects(configuration, list(effects))
-    later = effects_from > 0.0
+    later, period = effects_from > 0.0, configuration.timing.period
     twin = Twin(configuration if later else actual, float(demands[0, 0]), seed)
-    if controller is None:
-        # A refused test must not replace an existing recording, so check before writing.
-        set_up(actual.controller, actual.timing.period)
     settings = flatten(configuration)
     controller_settings: dict[str, object] = dict(settings["controller"])
-    blocks = run_compiled(twin, actual, demands, BLOCK if later else AT_ONCE)
-    if controller is not None:
-        controller_settings = {
-            OWN: True,
-            **{name: controller_settings[name] for name in ("start", "preload")},
-        }
+    if controller is None:
+        # A refused test must not replace an existing recording, so check before writing.
+        set_up(actual.controller, period)
+        blocks = run_compiled(twin, actual, demands, BLOCK if later else AT_ONCE)
+    else:
+        known = {name: controller_settings[name] for name in ("start", "preload")}
+        controller_settings = {OWN: True, **known}
         blocks = run(twin, actual, demands, controller)
     ticks, trip, column = 0, Trip.NONE, 0
-    period = configuration.timing.period
     with Writer(
         path, experiment, period, controller_settings, machine, description=description
     ) as writer:
@@ -189,7 +184,8 @@ def record(
         for block in blocks:
             _append_block(writer, block)
             ticks, trip, column = ticks + len(block.commands), block.trip, block.column
-            if later and ticks * configuration.timing.period >= effects_from - 1e-9:
+            # The compiled loop ends with a block, so the effects can only begin at its end.
+            if later and ticks * period >= effects_from - 1e-9:
                 twin.change(actual)
                 later = False
             progress(len(block.commands))

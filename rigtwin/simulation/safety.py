@@ -261,10 +261,8 @@ def stop_state(limits: Safety, commands: Commands) -> Commands:
 def is_beyond(limits: Safety, measured: Measurements) -> bool:
     """Return whether a cylinder is beyond its limit, or its position is unknown."""
     # Compared this way round, a NaN counts as beyond.
-    ground, structure = (
-        abs(measured.ground_lvdt) <= limits.ground,
-        abs(measured.structure_lvdt) <= limits.structure,
-    )
+    ground = abs(measured.ground_lvdt) <= limits.ground
+    structure = abs(measured.structure_lvdt) <= limits.structure
     return not (ground and structure and abs(measured.suspension_lvdt) <= limits.travel)
 
 
@@ -286,12 +284,8 @@ def find_arming_obstacle(limits: Safety, measured: Measurements) -> str | None:
         Reason, or None if the rig may be armed.
     """
     share = 1.0 - limits.hysteresis
-    for name, limit in zip(
-        Measurements._fields,
-        (limits.ground, limits.structure, limits.travel, limits.force),
-        strict=True,
-    ):
-        value = getattr(measured, name)
+    largest = (limits.ground, limits.structure, limits.travel, limits.force)
+    for name, value, limit in zip(Measurements._fields, measured, largest, strict=True):
         if not abs(value) <= share * limit:
             return (
                 f"{name} is {value:.4g}; arming needs it within {share * limit:.4g}, "

@@ -31,12 +31,7 @@ from rigtwin.recording import Recording
 
 @kernel
 def _states(
-    controlling: Controller,
-    start: Array,
-    plate: Array,
-    measured: Array,
-    demands: Array,
-    out: Array,
+    controlling: Controller, start: Array, plate: Array, measured: Array, demands: Array, out: Array
 ) -> None:
     state = unpacked(to_fixed_tuple(start, SIZE), plate)  # type: ignore[call-arg]
     for tick in range(len(measured)):

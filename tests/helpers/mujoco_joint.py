@@ -12,21 +12,22 @@ from collections.abc import Callable
 import mujoco
 import numpy as np
 
-from rigtwin.components import Guide, Pusher, measures
+from rigtwin.components import Guide
 from rigtwin.components.conditioning import actuator, condition, hold
 from rigtwin.components.guide import damping, dry_limits, friction, position_force, slide
-from rigtwin.components.mount import give_way
+from rigtwin.components.guide_step import guide_step_of
+from rigtwin.components.mount import MountState, give_way
 from rigtwin.components.plant import Plant
-from rigtwin.components.servo import pull, push, push_law
+from rigtwin.components.servo import pull, push, push_law, pusher_of
+from rigtwin.description.control import FormulaControl
 from rigtwin.models.commanding import (
     Command,
     Readings,
     command_by_formula,
     commands_of,
 )
-from rigtwin.models.joint import JointModel
 from rigtwin.models.joint_motion import Inertia
-from rigtwin.models.start import Start
+from rigtwin.models.joint_simulation import JointSimulation
 from rigtwin.numerics.arrays import Array
 
 FIXED = 1e12
@@ -40,7 +41,7 @@ OFF = (
 )
 
 
-class MujocoModel(JointModel):
+class MujocoModel(JointSimulation):
     """One joint of a machine in MuJoCo."""
 
     def _mechanics(
@@ -70,7 +71,7 @@ class MujocoModel(JointModel):
     def _inverse_dynamics(self, plant: Plant, position: Array, error: float) -> Array:
         """The force that moves the joint as prescribed, by inverse dynamics."""
         model, data, place, at = self._mechanics(plant, self._period)
-        guide, inertia = self._parts(plant)
+        guide, inertia = self.mechanics(plant)
         dry = friction(guide)
         velocity = np.gradient(position, self._period)
         acceleration = np.gradient(velocity, self._period)
@@ -78,8 +79,9 @@ class MujocoModel(JointModel):
         out = np.zeros((4, len(position)))
         out[0], out[1] = position, velocity
         slider, viscous = float(position[0]), 0.0
-        share = self._period / (guide.relaxation + self._period)
-        inner, speed = slider, 0.0
+        rest = self._replay.joint.rest
+        guide_step = guide_step_of(guide, 1.0 / softest, rest, self._period)
+        share, behind = guide_step.share, MountState(slider, 0.0, slider, viscous)
         for tick in range(len(position)):
             x, v = float(position[tick]), float(velocity[tick])
             data.qpos[place], data.qvel[at] = x, v
@@ -89,24 +91,10 @@ class MujocoModel(JointModel):
             mujoco.mj_inverse(model, data)
             load = float(data.qfrc_inverse[at])
             if guide.mount_compliance > 0.0:
-                within, slider, viscous, held_back = give_way(
-                    guide=guide,
-                    dry_friction=dry,
-                    spring=1.0 / softest,
-                    rest=inertia.rest,
-                    share=share,
-                    period=self._period,
-                    inner=inner,
-                    speed=speed,
-                    slider=slider,
-                    viscous=viscous,
-                    load=load,
-                    outer=x,
-                )
-                inner, speed = within, (within - inner) / self._period
+                behind, held_back = give_way(guide_step, behind, load, x)
                 out[2, tick] = load + held_back
                 continue
-            load += position_force(guide, x, inertia.rest)
+            load += position_force(guide, x, rest)
             forward, backward = dry_limits(dry, v, load)
             rubbed, by = slide(x - slider, 0.5 * guide.backlash, 1.0 / softest, forward, backward)
             slider += by
@@ -114,20 +102,17 @@ class MujocoModel(JointModel):
             out[2, tick] = load + rubbed + viscous + guide.drag * v * abs(v)
         return out
 
-    def _integrate_pushed(
-        self,
-        plant: Plant,
-        mover: Pusher,
-        disturbance: Array,
-        noise: Array | None = None,
-        start: Start | None = None,
+    def integrate_pushed(
+        self, plant: Plant, disturbance: Array, noise: Array | None = None
     ) -> Array:
         """The joint under its force actuator or servo."""
         h = self._period / self._steps
         model, data, place, at = self._mechanics(plant, h)
-        guide, inertia = self._parts(plant)
-        data.qpos[place], data.qvel[at] = self._start_of(plant) if start is None else start
-        passive = _Passive(guide, h, inertia, float(data.qpos[place]))
+        guide, inertia = self.mechanics(plant)
+        data.qpos[place], data.qvel[at] = self._start_of(plant)
+        rest = self._replay.joint.rest
+        passive = _Passive(guide, h, inertia, rest, float(data.qpos[place]))
+        mover = pusher_of(plant, self.mover.name)
         drive = actuator(mover, plant.computer, h)
         held = hold(drive, float(self._command[0]))
         law, wanted = push_law(mover), float(held.memory[3])
@@ -157,18 +142,20 @@ class MujocoModel(JointModel):
     def _reader(self, plant: Plant) -> Callable[[int, float, float], float]:
         """The command of a tick for the joint's position and velocity, as the controller sees
         them."""
-        names = self._sensors or self.sensors_of_joint()
+        names = list(self.control.sensors) or self.sensors_of_joint()
         ticks, columns = self._signals.ticks, self._signals.columns
         readings = Readings(plant, names, {}, self._period, ticks)
-        rates = {name: measures(getattr(plant, name)) == "velocity" for name in names}
-        channel = self._machine.components[self._replay.moved_by[0]].channel
+        components = self._machine.components
+        rates = {name: components[name].quantity == "velocity" for name in names}
+        channel = self.mover.channel
         output = [self._replay.moved_by[0] if channel is None else channel[1]]
         recorded = self._command
         own: Command = lambda tick, _: float(recorded[tick])  # noqa: E731
-        if self._control is not None:
-            components = self._machine.components
+        control = self._machine.control
+        if self.control.runs and isinstance(control, FormulaControl):
+            settings = self._configuration.controller._asdict()
             sensors = {c: name for name in names if (c := components[name].channel) is not None}
-            own = command_by_formula(self._control, self._settings, columns, sensors, self._period)
+            own = command_by_formula(control, settings, columns, sensors, self._period)
 
         def command(tick: int, position: float, velocity: float) -> float:
             true = {name: velocity if rate else position for name, rate in rates.items()}
@@ -183,23 +170,25 @@ class MujocoModel(JointModel):
         return [
             name
             for name, component in self._machine.components.items()
-            if component.joint == joint
-            and measures(getattr(self._machine.plant, name)) in ("position", "velocity")
+            if component.joint == joint and component.quantity in ("position", "velocity")
         ]
 
 
 class _Passive:
     """What a guide does to its joint over a timestep."""
 
-    def __init__(self, guide: Guide, timestep: float, inertia: Inertia, position: float) -> None:
-        self._guide, self._dry, self._rest = guide, friction(guide), inertia.rest
+    def __init__(
+        self, guide: Guide, timestep: float, inertia: Inertia, rest: float, position: float
+    ) -> None:
+        self._guide, self._dry, self._rest = guide, friction(guide), rest
         # As stiff as an explicit step bears, where the description gives a play no spring.
         self._spring = STIFF * inertia.mass / timestep**2
         if guide.compliance > 0.0:
             self._spring = min(self._spring, 1.0 / guide.compliance)
         self._slider, self._viscous = position, 0.0
-        self._inner, self._speed, self._timestep = position, 0.0, timestep
-        self._share = timestep / (guide.relaxation + timestep)
+        self._resistance = guide_step_of(guide, self._spring, rest, timestep)
+        self._share = self._resistance.share
+        self._behind = MountState(position, 0.0, position, 0.0)
 
     def act(
         self, model: mujoco.MjModel, data: mujoco.MjData, at: int, x: float, v: float, load: float
@@ -229,19 +218,5 @@ class _Passive:
 
     def _hold_back(self, x: float, load: float) -> float:
         """The force of a guide behind its mount."""
-        place, self._slider, self._viscous, force = give_way(
-            guide=self._guide,
-            dry_friction=self._dry,
-            spring=self._spring,
-            rest=self._rest,
-            share=self._share,
-            period=self._timestep,
-            inner=self._inner,
-            speed=self._speed,
-            slider=self._slider,
-            viscous=self._viscous,
-            load=load,
-            outer=x,
-        )
-        self._inner, self._speed = place, (place - self._inner) / self._timestep
+        self._behind, force = give_way(self._resistance, self._behind, load, x)
         return force

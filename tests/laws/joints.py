@@ -8,10 +8,11 @@ import numpy as np
 from controllers.formula import formula
 from rigtwin.components import Computer, ForceActuator, Guide, PositionSensor, Pusher
 from rigtwin.components.conditioning import actuator, hold
-from rigtwin.components.guide import friction
+from rigtwin.components.guide_step import guide_step_of
 from rigtwin.components.sensors import start_transducer, transducer
 from rigtwin.components.servo import push_law
-from rigtwin.models.joint_motion import Inertia, Loop, integrate_pushed, inverse_dynamics
+from rigtwin.models.joint_inverse import inverse_dynamics
+from rigtwin.models.joint_motion import Drive, Inertia, Loop, integrate_pushed
 from rigtwin.numerics.arrays import Array
 
 PERIOD = 1e-3
@@ -22,9 +23,9 @@ STIFF = 1e9
 """Stiffness of the spring in series with dry friction that counts as rigid, N/m."""
 
 
-def inertia_of(mass: float, load: float = 0.0, rest: float = 0.0) -> Inertia:
-    """Return a mass in kg under a constant load in N; its guide's spring is slack at `rest`, m."""
-    return Inertia(mass, -10.0, 20.0, np.full(2, load), rest, turns=False)
+def inertia_of(mass: float, load: float = 0.0) -> Inertia:
+    """Return a mass in kg under a constant load in N."""
+    return Inertia(mass, -10.0, 20.0, np.full(2, load), turns=False)
 
 
 def force_to_move(
@@ -39,8 +40,8 @@ def force_to_move(
     speed = np.gradient(position, PERIOD)
     motion = np.ascontiguousarray(np.stack([position, speed, np.gradient(speed, PERIOD)]))
     force = np.empty(len(position))
-    inertia = inertia_of(mass, load, rest)
-    inverse_dynamics(guide, friction(guide), inertia, spring, PERIOD, motion, force)
+    guide_step = guide_step_of(guide, spring, rest, PERIOD)
+    inverse_dynamics(guide_step, inertia_of(mass, load), motion, force)
     return force
 
 
@@ -61,6 +62,7 @@ def motion_under(
     of = ForceActuator() if mover is None else mover
     none = formula("0", {})
     empty = np.zeros((1, 1))
+    sensor = transducer(PositionSensor(), PERIOD)
     loop = Loop(
         closed=False,
         program=none.program,
@@ -68,28 +70,24 @@ def motion_under(
         memory=none.memory(),
         recorded=empty,
         noise=empty,
-        sensor=np.zeros(0, np.int64),
-    )
-    drive = actuator(of, Computer(), PERIOD / steps)
-    sensor = transducer(PositionSensor(), PERIOD)
-    motion = np.zeros((3, len(command)))
-    integrate_pushed(
-        guide=guide,
-        dry_friction=friction(guide),
-        inertia=inertia_of(mass, load),
-        spring=spring,
-        start=start,
-        law=push_law(of),
-        drive=drive,
-        held=hold(drive, float(command[0])),
+        sensor_of_input=np.zeros(0, np.int64),
         sensors=(sensor,),
         states=(start_transducer(sensor),),
-        kinds=np.zeros(1, np.int64),
+        neutral=np.ones(1, np.bool_),
+        rates=np.zeros(1, np.int64),
+    )
+    conditioning = actuator(of, Computer(), PERIOD / steps)
+    motion = np.zeros((4, len(command)))
+    motion[3] = command
+    integrate_pushed(
+        guide_step=guide_step_of(guide, spring, 0.0, PERIOD / steps),
+        inertia=inertia_of(mass, load),
+        start=start,
+        drive=Drive(push_law(of), conditioning, hold(conditioning, float(command[0]))),
         loop=loop,
-        command=command.astype(float),
         disturbance=np.zeros(len(command)),
         period=PERIOD,
         steps=steps,
         out=motion,
     )
-    return motion
+    return motion[:3]

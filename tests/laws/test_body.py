@@ -8,11 +8,11 @@ import pytest
 from rigtwin.components import Base, Body
 from rigtwin.components.body import (
     about_frame,
-    arrange_pseudo_inertia,
     list_parameters,
     list_surplus,
     turn_gravity,
 )
+from tests.helpers.bodies import arrange_pseudo_inertia
 from tests.laws.written import law_of
 
 INERTIA = np.array([[0.04, 0.003, -0.002], [0.003, 0.05, 0.004], [-0.002, 0.004, 0.03]])

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from rigtwin.components import Guide
-from rigtwin.components.guide import friction
+from rigtwin.components.guide_step import guide_step_of
 from rigtwin.description.document import load
-from rigtwin.models.joint_motion import resist_at_once
+from rigtwin.models.joint_inverse import resist_at_once
 from rigtwin.recording import Recording
 from tests.laws.joints import INTERPRETED, PERIOD, force_to_move, motion_under
 from tests.laws.written import law_of
@@ -60,7 +60,7 @@ def test_joints_moved_together_count_the_bodies_load_and_the_guides_spring():
     position = 0.2 * TIME
     motion = np.stack([position, np.full(500, 0.2), np.zeros(500)])
     force = np.full(500, -30.0)
-    resist_at_once(guide, friction(guide), 0.0, PERIOD, motion, force)
+    resist_at_once(guide_step_of(guide, 1.0, 0.0, PERIOD), motion, force)
     carried = -30.0 + 50.0 * position
     np.testing.assert_allclose(force, carried + COULOMB + MU * np.abs(carried))
 

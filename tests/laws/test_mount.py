@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from rigtwin.components import Guide, mount
-from rigtwin.components.guide import friction
-from rigtwin.components.mount import give_way, guess_position, resist_at
+from rigtwin.components.guide_step import guide_step_of
+from rigtwin.components.mount import MountState, give_way, guess_position, resist_at
 from tests.laws.joints import PERIOD, force_to_move, motion_under
 from tests.laws.written import law_of
 
@@ -82,27 +82,16 @@ def test_the_mounts_stretch_is_its_compliance_times_all_that_the_guide_does(guid
     limits = limits_of(guide, speed, load)
     if guide.coulomb == guide.stribeck == guide.load_coefficient == 0.0:
         slider = inner
-    position, slid_to, lagging, force = give_way(
-        guide,
-        friction(guide),
-        SPRING,
-        REST,
-        share,
-        STEP,
-        inner,
-        speed,
-        slider,
-        viscous,
-        load,
-        outer,
-    )
+    guide_step = guide_step_of(guide, SPRING, REST, STEP)
+    state = MountState(inner, speed, slider, viscous)
+    (position, _, slid_to, lagging), force = give_way(guide_step, state, load, outer)
     expected = written_resistance(guide, share, inner, slider, viscous, limits, position)
     assert force == pytest.approx(expected[0], abs=1e-9)
     assert slid_to == pytest.approx(slider + expected[1], abs=1e-15)
     assert lagging == pytest.approx(expected[2], abs=1e-9)
     mismatch = position + guide.mount_compliance * force - outer
     assert abs(mismatch) <= 1.1e-9 * abs(outer - inner) + 1e-15
-    directly = resist_at(guide, SPRING, REST, share, STEP, inner, slider, viscous, limits, position)
+    directly = resist_at(guide_step, state, limits, position)
     assert directly == pytest.approx(expected, abs=1e-9)
 
 
@@ -114,8 +103,9 @@ def test_where_only_dry_friction_is_nonlinear_the_first_guess_is_the_equilibrium
     )
     share = STEP / (guide.relaxation + STEP)
     limits = limits_of(guide, speed, load)
-    arguments = (guide, SPRING, REST, share, STEP, inner, speed, slider, viscous, limits)
-    position, slope = guess_position(*arguments, outer)
+    guide_step = guide_step_of(guide, SPRING, REST, STEP)
+    state = MountState(inner, speed, slider, viscous)
+    position, slope = guess_position(guide_step, state, limits, outer)
     force = written_resistance(guide, share, inner, slider, viscous, limits, position)[0]
     assert position + guide.mount_compliance * force == pytest.approx(outer, abs=1e-14)
     # The slope is how much further the mount's end is for a guide that is further.
@@ -140,8 +130,10 @@ def test_a_guide_with_steep_waves_finds_an_equilibrium_however_soft_its_mount(se
             mount_compliance=10.0 ** random.uniform(-6.0, -3.0),
         )
         outer, inner, slider = random.uniform(-0.02, 0.02, 3)
-        arguments = (guide, friction(guide), SPRING, REST, 1.0, STEP, inner, 0.1, slider, 0.0, 0.0)
-        position, _, _, force = give_way(*arguments, outer)
+        guide_step = guide_step_of(guide, SPRING, REST, STEP)
+        (position, *_), force = give_way(
+            guide_step, MountState(inner, 0.1, slider, 0.0), 0.0, outer
+        )
         mismatch = position + guide.mount_compliance * force - outer
         assert abs(mismatch) <= 1.1e-9 * abs(outer - inner) + 1e-15
 
@@ -159,9 +151,9 @@ def test_an_equilibrium_needs_few_evaluations_of_the_law(monkeypatch, guide, mos
     counts: list[int] = []
     evaluate = mount.resist_at
 
-    def count(**arguments: Any) -> tuple[float, float, float]:
+    def count(*arguments: Any) -> tuple[float, float, float]:
         counts[-1] += 1
-        return evaluate(**arguments)
+        return evaluate(*arguments)
 
     monkeypatch.setattr(mount, "resist_at", count)
     for shares in STATES:
@@ -169,20 +161,8 @@ def test_an_equilibrium_needs_few_evaluations_of_the_law(monkeypatch, guide, mos
             share * size for share, size in zip(shares, SIZES, strict=True)
         )
         counts.append(0)
-        give_way(
-            guide,
-            friction(guide),
-            SPRING,
-            REST,
-            1.0,
-            STEP,
-            inner,
-            speed,
-            slider,
-            viscous,
-            load,
-            outer,
-        )
+        guide_step = guide_step_of(guide, SPRING, REST, STEP)
+        give_way(guide_step, MountState(inner, speed, slider, viscous), load, outer)
     assert max(counts) <= most
 
 

@@ -1,0 +1,137 @@
+"""Dry friction of guides that act on each other, by projected Gauss-Seidel. Compiled.
+
+The friction of one guide changes the velocity along all others. With the velocities w_g without any
+dry friction and the responses C_gj to 1 N at guide j over the step, the friction forces F satisfy
+
+    v_g = w_g − Σ_j C_gj·F_j,   F_g = clip(k_g·stretch(v_g), −backward_g, forward_g)
+
+Each sweep solves guide after guide, with the friction of the others as it was last (Jourdan, Alart
+and Jean, Computer Methods in Applied Mechanics and Engineering 155, 1998). The limits make it a
+projection, which converges because the responses are a positive semidefinite matrix.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from controllers.compiled import inlined
+from rigtwin.components import Guide
+from rigtwin.models.forward_arrays import GuideContacts, State, WorkSpace
+from rigtwin.numerics.cholesky import solve
+from rigtwin.numerics.compiling import kernel
+
+SWEEPS, CONVERGED = 200, 1e-10
+"""Maximum number of Gauss-Seidel sweeps. The sweeps end once no friction force changes by more than
+this share of the largest friction limit."""
+BACKLASH = Guide._fields.index("backlash")
+
+
+@kernel
+def bear(
+    stretch: float,
+    free: float,
+    compliance: float,
+    h: float,
+    half: float,
+    spring: float,
+    forward: float,
+    backward: float,
+) -> float:
+    """Return the dry friction of one guide over a step, with the friction of the others fixed.
+
+    The friction is a spring of stiffness k behind a backlash b, limited to what the contact bears:
+    F = k·(x⁺ − x_slider ∓ b/2) with x⁺ = x + h·(v_free − w·F), clipped to [−backward, forward].
+
+    Parameters
+    ----------
+    stretch
+        Distance from the friction element to the guide, m.
+    free
+        Velocity of the guide without this friction, m/s.
+    compliance
+        Velocity that 1 N of friction takes from the guide over the step (w), m/(s N).
+    h
+        Step, s.
+    half
+        Half the backlash, m.
+    spring
+        Stiffness in series with the friction, N/m.
+    forward, backward
+        Limits of the friction against positive and negative motion, N.
+
+    Returns
+    -------
+    float
+        Friction force, N.
+    """
+    unopposed = stretch + h * free
+    if -half <= unopposed <= half:
+        return 0.0
+    stretched = unopposed - math.copysign(half, unopposed)
+    # The friction shortens the spring that it stretches, hence the denominator.
+    force = spring * stretched / (1.0 + h * spring * compliance)
+    return min(max(force, -backward), forward)
+
+
+@inlined
+def find_responses(contacts: GuideContacts, free: np.ndarray, h: float, work: WorkSpace) -> float:
+    """Find the velocities without dry friction, and the responses to 1 N of it at each guide.
+
+    Returns the largest limit of any dry friction, N.
+    """
+    guides, loose, largest = len(contacts.springs), len(free), 0.0
+    for g in range(guides):
+        work.dry[g] = 0.0
+        if work.mounted[g] or not contacts.rubs[g]:
+            continue
+        largest = max(largest, work.forward[g], work.backward[g])
+        for a in range(loose):
+            # An impulse of h·1 N along the guide, whose response is M⁻¹·a·h by the factor of the
+            # step.
+            work.column[a] = h * contacts.along[g, free[a]]
+            work.unrubbed[g] += contacts.along[g, free[a]] * work.right[a]
+        solve(work.system, loose, work.column)
+        for a in range(loose):
+            work.response[g, a] = work.column[a]
+        for second in range(guides):
+            work.coupling[second, g] = 0.0
+            for a in range(loose):
+                work.coupling[second, g] += contacts.along[second, free[a]] * work.column[a]
+    return largest
+
+
+@inlined
+def rub(contacts: GuideContacts, free: np.ndarray, state: State, h: float, work: WorkSpace) -> None:
+    """Find the dry friction of all guides, and take its effect from the free velocities."""
+    guides, loose = len(contacts.springs), len(free)
+    largest = find_responses(contacts, free, h, work)
+    for _ in range(SWEEPS):
+        changed = 0.0
+        for g in range(guides):
+            if work.mounted[g] or not contacts.rubs[g]:
+                continue
+            speed = work.unrubbed[g]
+            for second in range(guides):
+                if second != g:
+                    speed -= work.coupling[g, second] * work.dry[second]
+            friction_force = bear(
+                stretch=work.place[g] - state.slider[g],
+                free=speed,
+                compliance=work.coupling[g, g],
+                h=h,
+                half=0.5 * contacts.guides[g, BACKLASH],
+                spring=contacts.springs[g],
+                forward=work.forward[g],
+                backward=work.backward[g],
+            )
+            changed = max(changed, abs(friction_force - work.dry[g]))
+            work.dry[g] = friction_force
+        # A single guide converges in one sweep, and ends after the second.
+        if changed <= CONVERGED * largest:
+            break
+    for g in range(guides):
+        if work.dry[g] != 0.0:
+            for a in range(loose):
+                work.right[a] -= work.response[g, a] * work.dry[g]

@@ -1,0 +1,67 @@
+"""Motion of a joint by the sensor that measured it, and the friction that its error can show."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rigtwin.components import Guide
+from rigtwin.components.guide import friction, friction_size
+from rigtwin.components.sensors import Sensor, remove_drift
+from rigtwin.numerics.arrays import Array
+
+ELASTIC = 0.3
+"""Shortest distance over which friction that reverses builds up, in errors of the measured motion.
+Without it, friction would jump with the noise of the velocity's sign."""
+
+
+def recover_motion(sensor: Sensor, measured: Array, period: float) -> Array:
+    """Recover the true motion from a measured one that was smoothed.
+
+    Inverts the sensor y = gain·x + offset + drift·t, its first-order lag and its delay.
+
+    Parameters
+    ----------
+    sensor
+        Sensor whose offset, drift, gain, lag and delay are undone.
+    measured
+        Smoothed reading, shape (ticks,).
+    period
+        Time from tick to tick, s.
+
+    Returns
+    -------
+    array
+        True motion, shape (ticks,).
+    """
+    # A lag T is inverted by x = y + T·y', which needs a smooth signal.
+    signal = measured
+    if sensor.lag > 0.0:
+        signal = signal + sensor.lag * np.gradient(signal, period)
+    # Linear interpolation between ticks; a delay beyond the last tick repeats the last value.
+    if sensor.delay != 0.0:
+        ticks = np.arange(len(signal))
+        signal = np.interp(ticks + sensor.delay / period, ticks, signal)
+    return (remove_drift(sensor, signal, period) - sensor.offset) / sensor.gain
+
+
+def softest_contact(guide: Guide, load: Array, position: Array, error: float) -> float:
+    """Return the compliance in series with dry friction along a measured motion, m/N.
+
+    The error of the measured motion hides smaller ones: friction that reverses builds up over at
+    least `ELASTIC` of it.
+
+    Parameters
+    ----------
+    guide
+        Guide with the friction.
+    load
+        Force that the guide transmits, N, shape (ticks,).
+    position
+        Position along the guide, m, shape (ticks,).
+    error
+        Standard error of the position, m.
+    """
+    size = max(friction_size(friction(guide), float(np.sqrt(np.mean(load**2)))), 1e-300)
+    # A billionth of the stroke keeps the spring finite where the motion has no error.
+    stroke = max(float(np.ptp(position)), 1e-12)
+    return max(guide.compliance, ELASTIC * error / size, 1e-9 * stroke / size)
