@@ -42,6 +42,10 @@ class Servo(NamedTuple):
     delay: Annotated[float, Quantity("s", 0.0, 1.0, NONE)] = 0.0
     deadband: Annotated[float, Quantity("m", 0.0, 100.0, NONE)] = 0.0
     rate_limit: Annotated[float, Quantity("m/s", 1e-9, UNLIMITED, NONE)] = UNLIMITED
+    # Play between motor and joint; the servo measures the position of its motor.
+    backlash: Annotated[float, Quantity("m", 0.0, 100.0, NONE)] = 0.0
+    rotor_share: Annotated[float, Quantity("1", 0.02, 0.98, "0.5: as much as the joint")] = 0.5
+    rotor_friction: Annotated[float, Quantity("N", 0.0, 1e7, NONE)] = 0.0
 
 
 Pusher = ForceActuator | Servo
@@ -52,6 +56,21 @@ PUSHERS = (ForceActuator, Servo)
 def pusher_of(plant: Plant, name: str) -> Pusher:
     """Return the force actuator or servo of a plant with a name."""
     return component_of(plant, name, *PUSHERS)
+
+
+class Play(NamedTuple):
+    """Play between an actuator's motor and the joint, as compiled code takes it."""
+
+    half: float  # Half the play, m; 0 for none.
+    rotor_share: float  # Share of the joint's inertia that is the motor's rotor.
+    rotor_friction: float  # Coulomb friction of the rotor, N.
+
+
+def play_of(actuator: Pusher) -> Play:
+    """Return the play between an actuator's motor and the joint; a force actuator has none."""
+    if isinstance(actuator, Servo):
+        return Play(0.5 * actuator.backlash, actuator.rotor_share, actuator.rotor_friction)
+    return Play(0.0, 0.5, 0.0)
 
 
 class Push(NamedTuple):
@@ -129,7 +148,21 @@ def _force_limit(context: Context) -> Starts:
     return Starts.single([share * size for share in (2.5, 1.7, 1.2, 0.8, 0.5)], 0.004 * size)
 
 
+def _backlash(context: Context) -> Starts:
+    stroke, force = context.scales.stroke, context.scales.force
+    plays = [share * stroke for share in (0.01, 0.04, 0.12, 0.4)]
+    values = tuple((play, 0.5, 0.1 * force) for play in plays)
+    return Starts(values, (0.002 * stroke, 0.02, 0.01 * force))
+
+
 KINDS = (
+    Kind(
+        "backlash",
+        "backlash",
+        ("backlash", "rotor_share", "rotor_friction"),
+        "a play between the servo's motor, whose position it controls, and the joint",
+        {Servo: _backlash},
+    ),
     Kind(
         "position_gain",
         "position gain",

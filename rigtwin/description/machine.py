@@ -354,7 +354,7 @@ class Machine:
             # With one actuator the two delays would be the same effect under two names.
             if effect.group == "computer" and len(movers) < 2:
                 continue
-            if effect.name in self.excluded:
+            if effect.name in self.excluded or (effect.of, effect.kind.name) in self.physics.lacks:
                 continue
             known = self.components.get(effect.group)
             if known is None or known.kinds is None or effect.kind.name in known.kinds:

@@ -97,6 +97,8 @@ class Physics(ABC):
         Whether the model fits a recording equally well when time runs backwards.
     lacks_stops : bool
         Whether the model leaves out the stops at the ends of the joints' ranges.
+    lacks : set of pairs
+        Types of component and kinds of effect that the model does not have.
     has_contacts : bool
         Whether the model has the contacts of the MJCF.
     longest_delay : float
@@ -113,6 +115,7 @@ class Physics(ABC):
     compares_controller: ClassVar[bool] = True
     reversible: ClassVar[bool] = False
     lacks_stops: ClassVar[bool] = False
+    lacks: ClassVar[frozenset[tuple[type, str]]] = frozenset()
     has_contacts: ClassVar[bool] = False
     longest_delay: ClassVar[float] = math.inf
 

@@ -26,11 +26,12 @@ import numpy as np
 from controllers.compiled import compilable, inlined
 from controllers.formula import Program, run
 from rigtwin.components.conditioning import Actuator, ActuatorState, condition
-from rigtwin.components.guide import damping, dry_limits, position_force, slide
+from rigtwin.components.guide import damping
 from rigtwin.components.guide_step import GuideStep
 from rigtwin.components.mount import MountState, give_way
 from rigtwin.components.sensors import Transducer, TransducerState, transduce
-from rigtwin.components.servo import Push, pull, push
+from rigtwin.components.servo import Play, Push, pull, push
+from rigtwin.models.joint_step import step_behind_play, step_joint
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import loop_kernel
 
@@ -61,6 +62,7 @@ class Drive(NamedTuple):
     law: Push  # Law from the conditioned command to the force.
     conditioning: Actuator  # Conditioning of the command, for one integration step.
     held: ActuatorState  # State of the conditioning, changed in place.
+    play: Play  # Play between its motor and the joint.
 
 
 class Loop(NamedTuple):
@@ -175,61 +177,6 @@ def push_joint(
     return pushed, held_by, wanted
 
 
-@inlined
-def step_joint(
-    guide_step: GuideStep,
-    mass: float,
-    state: tuple[float, float, float, float],
-    pushed: float,
-    held_by: float,
-    outer: float,
-) -> tuple[float, float, float, float]:
-    """Advance a joint whose guide has a rigid mount by one step.
-
-    Parameters
-    ----------
-    guide_step
-        Guide of the joint, for the integration step.
-    mass
-        Inertia of the joint, kg.
-    state
-        Position, m, velocity, m/s, position of the friction element, m, and viscous force, N.
-    pushed, held_by
-        Actuator's force without damping, N, and its damping, Ns/m.
-    outer
-        All forces but the guide's and the damping's: actuator, disturbance and gravity, N.
-
-    Returns
-    -------
-    tuple
-        State after the step.
-    """
-    guide, spring, (x, v, slider, viscous) = guide_step.guide, guide_step.spring, state
-    h, share, half = guide_step.step, guide_step.share, 0.5 * guide.backlash
-    coefficient = damping(guide, v)
-    load = outer - position_force(guide, x, guide_step.rest) - (1.0 - share) * viscous
-    damped = h * (share * coefficient + guide.drag * abs(v) + held_by)
-    # Implicit share of the damping: the midpoint rule's ½ until d·h = 2m, where it would start to
-    # oscillate, and more beyond.
-    ahead = 1.0 - mass / damped if damped > 2.0 * mass else 0.5
-    total = mass + ahead * damped
-    rhs = (mass - (1.0 - ahead) * damped) * v + h * load
-    forward, backward = dry_limits(guide_step.dry_friction, v, pushed)
-    # Without dry friction; then with a stretched spring; then with a slider that slides.
-    velocity = rhs / total
-    stretch_length = x + h * velocity - slider
-    if stretch_length > half or stretch_length < -half:
-        edge = math.copysign(half, stretch_length)
-        velocity = (rhs - h * spring * (x - slider - edge)) / (total + h * h * spring)
-        dry, by = slide(x + h * velocity - slider, half, spring, forward, backward)
-        if by != 0.0:
-            velocity = (rhs - h * dry) / total
-            slider = x + h * velocity - edge - dry / spring
-    between = ahead * velocity + (1.0 - ahead) * v
-    viscous += share * (coefficient * between - viscous)
-    return x + h * velocity, velocity, slider, viscous
-
-
 @loop_kernel
 def integrate_pushed(
     guide_step: GuideStep,
@@ -267,7 +214,8 @@ def integrate_pushed(
     h, (x, v) = guide_step.step, start
     slider, viscous = x, damping(guide_step.guide, v) * v
     behind = MountState(x, 0.0, slider, viscous)
-    law, mass = drive.law, inertia.mass
+    law, mass, rotor = drive.law, inertia.mass, start
+    plays = drive.play.half > 0.0
     follows = law.position_gain > 0.0
     # What the step before leaves: a servo's conditioned command, or a force actuator's force.
     last = drive.held.memory[3] if follows else 0.0
@@ -276,12 +224,22 @@ def integrate_pushed(
     for tick in range(len(disturbance)):
         # Sensors read before the tick's command acts.
         out[0, tick], out[1, tick] = x, v
-        out[2, tick] = push(law, last, x, v) if follows else last
+        out[2, tick] = push(law, last, rotor[0], rotor[1]) if follows else last
         if loop.closed:
             out[3, tick] = compute_command(loop, tick, x, v, period)
         for _ in range(steps):
-            pushed, held_by, last = push_joint(drive, out[3, tick], last, x, v)
+            pushed, held_by, last = push_joint(drive, out[3, tick], last, rotor[0], rotor[1])
             outer = pushed + disturbance[tick] - gravity(inertia, x)
+            if plays:
+                rotor, (x, v, slider, viscous) = step_behind_play(
+                    guide_step,
+                    drive.play,
+                    mass,
+                    rotor,
+                    (x, v, slider, viscous),
+                    (pushed, held_by, outer - pushed),
+                )
+                continue
             if yields:
                 behind, held_back = give_way(guide_step, behind, pushed, x)
                 # The mount decouples the guide, whose force is therefore explicit; only a servo's
@@ -292,3 +250,4 @@ def integrate_pushed(
                 x, v, slider, viscous = step_joint(
                     guide_step, mass, (x, v, slider, viscous), pushed, held_by, outer
                 )
+            rotor = (x, v)

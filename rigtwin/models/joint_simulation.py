@@ -17,7 +17,7 @@ from rigtwin.components.guide_step import guide_step_of
 from rigtwin.components.plant import Plant, select
 from rigtwin.components.schedule import follow, scheduled_force
 from rigtwin.components.sensors import Sensor, sensor_of
-from rigtwin.components.servo import push_all, push_law, pusher_of
+from rigtwin.components.servo import play_of, push_all, push_law, pusher_of
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Machine, ReplayOf
 from rigtwin.models.following import follow_command
@@ -343,6 +343,7 @@ class JointSimulation:
         guide_step = guide_step_of(guide, spring, self._replay.joint.rest, h)
         mover = pusher_of(plant, self.mover.name)
         law, conditioning = push_law(mover), actuator(mover, plant.computer, h)
+        play = play_of(mover)
 
         def integrate(start: Start, disturbance: Array) -> Array:
             out = np.zeros((4, len(disturbance)))
@@ -351,7 +352,7 @@ class JointSimulation:
                 guide_step=guide_step,
                 inertia=inertia,
                 start=start,
-                drive=Drive(law, conditioning, hold(conditioning, float(self._command[0]))),
+                drive=Drive(law, conditioning, hold(conditioning, float(self._command[0])), play),
                 loop=self.control.loop(plant, self._period, noise),
                 disturbance=np.ascontiguousarray(disturbance),
                 period=self._period,

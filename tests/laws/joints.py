@@ -10,7 +10,7 @@ from rigtwin.components import Computer, ForceActuator, Guide, PositionSensor, P
 from rigtwin.components.conditioning import actuator, hold
 from rigtwin.components.guide_step import guide_step_of
 from rigtwin.components.sensors import start_transducer, transducer
-from rigtwin.components.servo import push_law
+from rigtwin.components.servo import play_of, push_law
 from rigtwin.models.joint_inverse import inverse_dynamics
 from rigtwin.models.joint_motion import Drive, Inertia, Loop, integrate_pushed
 from rigtwin.numerics.arrays import Array
@@ -83,7 +83,7 @@ def motion_under(
         guide_step=guide_step_of(guide, spring, 0.0, PERIOD / steps),
         inertia=inertia_of(mass, load),
         start=start,
-        drive=Drive(push_law(of), conditioning, hold(conditioning, float(command[0]))),
+        drive=Drive(push_law(of), conditioning, hold(conditioning, float(command[0])), play_of(of)),
         loop=loop,
         disturbance=np.zeros(len(command)),
         period=PERIOD,

@@ -1,0 +1,147 @@
+"""One step of a joint that a force pushes, with its dry friction implicit. Compiled.
+
+Between motor and joint there may be a play. The motor's rotor and the joint then are two masses
+whose distance, rotor minus joint, stays within ± half the play. A contact is rigid and inelastic: a
+force λ holds the distance at the edge in the steps in which it would exceed it.
+"""
+
+from __future__ import annotations
+
+import math
+
+from controllers.compiled import compilable, inlined
+from rigtwin.components.guide import damping, dry_limits, position_force, slide
+from rigtwin.components.guide_step import GuideStep
+from rigtwin.components.servo import Play
+
+CORRECTIONS = 4
+"""Number of times that a contact force is corrected. One suffices without dry friction: only what
+sticks moves less than its inertia says."""
+
+
+@inlined
+def step_joint(
+    guide_step: GuideStep,
+    mass: float,
+    state: tuple[float, float, float, float],
+    pushed: float,
+    held_by: float,
+    outer: float,
+) -> tuple[float, float, float, float]:
+    """Advance a joint whose guide has a rigid mount by one step.
+
+    Parameters
+    ----------
+    guide_step
+        Guide of the joint, for the integration step.
+    mass
+        Inertia of the joint, kg.
+    state
+        Position, m, velocity, m/s, position of the friction element, m, and viscous force, N.
+    pushed, held_by
+        Actuator's force without damping, N, and its damping, Ns/m.
+    outer
+        All forces but the guide's and the damping's: actuator, disturbance and gravity, N.
+
+    Returns
+    -------
+    tuple
+        State after the step.
+    """
+    guide, spring, (x, v, slider, viscous) = guide_step.guide, guide_step.spring, state
+    h, share, half = guide_step.step, guide_step.share, 0.5 * guide.backlash
+    coefficient = damping(guide, v)
+    load = outer - position_force(guide, x, guide_step.rest) - (1.0 - share) * viscous
+    damped = h * (share * coefficient + guide.drag * abs(v) + held_by)
+    # Implicit share of the damping: the midpoint rule's ½ until d·h = 2m, where it would start to
+    # oscillate, and more beyond.
+    ahead = 1.0 - mass / damped if damped > 2.0 * mass else 0.5
+    total = mass + ahead * damped
+    rhs = (mass - (1.0 - ahead) * damped) * v + h * load
+    forward, backward = dry_limits(guide_step.dry_friction, v, pushed)
+    # Without dry friction; then with a stretched spring; then with a slider that slides.
+    velocity = rhs / total
+    stretch_length = x + h * velocity - slider
+    if stretch_length > half or stretch_length < -half:
+        edge = math.copysign(half, stretch_length)
+        velocity = (rhs - h * spring * (x - slider - edge)) / (total + h * h * spring)
+        dry, by = slide(x + h * velocity - slider, half, spring, forward, backward)
+        if by != 0.0:
+            velocity = (rhs - h * dry) / total
+            slider = x + h * velocity - edge - dry / spring
+    between = ahead * velocity + (1.0 - ahead) * v
+    viscous += share * (coefficient * between - viscous)
+    return x + h * velocity, velocity, slider, viscous
+
+
+@compilable
+def _carry(
+    guide_step: GuideStep,
+    mass: float,
+    state: tuple[float, float, float, float],
+    pushed: float,
+    outer: float,
+) -> tuple[float, float, float, float]:
+    """Advance a joint without a servo's damping; arguments as in `step_joint`."""
+    # A call of its own: the compiler's SSA pass mistakes two inlined copies in one loop.
+    return step_joint(guide_step, mass, state, pushed, 0.0, outer)
+
+
+@compilable
+def _shrink(speed: float, most: float) -> float:
+    """Return a speed after dry friction took `most` of it, and no more than all of it."""
+    return math.copysign(max(abs(speed) - most, 0.0), speed)
+
+
+@compilable
+def step_behind_play(
+    guide_step: GuideStep,
+    play: Play,
+    mass: float,
+    rotor: tuple[float, float],
+    state: tuple[float, float, float, float],
+    forces: tuple[float, float, float],
+) -> tuple[tuple[float, float], tuple[float, float, float, float]]:
+    """Advance a joint whose motor acts through a play by one step.
+
+    Parameters
+    ----------
+    guide_step
+        What resists the motion of the joint.
+    play
+        Play between motor and joint.
+    mass
+        Inertia of joint and rotor together, kg.
+    rotor
+        Position and velocity of the rotor, seen from the joint, m and m/s.
+    state
+        State of the joint, as in `step_joint`.
+    forces
+        Actuator's force without damping, N, its damping, Ns/m, and all other forces on the joint
+        but the guide's, N.
+
+    Returns
+    -------
+    tuple
+        Position and velocity of the rotor, and state of the joint, after the step.
+    """
+    h, (pushed, held_by, outer) = guide_step.step, forces
+    turning = play.rotor_share * mass
+    carried = mass - turning
+    # The damping of the servo is implicit, as if it added to the rotor's inertia.
+    heavy = turning + h * held_by
+    freely = (turning * rotor[1] + h * pushed) / heavy
+    rubbing = h * play.rotor_friction / heavy
+    moved = _carry(guide_step, carried, state, pushed, outer)
+    speed, contact = _shrink(freely, rubbing), 0.0
+    distance = rotor[0] + h * speed - moved[0]
+    if abs(distance) > play.half:
+        side = math.copysign(1.0, distance)
+        for _ in range(CORRECTIONS):
+            beyond = side * distance - play.half
+            # Both masses give way to the contact's force in inverse proportion to their inertia.
+            contact = max(contact + beyond / (h * h * (1.0 / heavy + 1.0 / carried)), 0.0)
+            speed = _shrink(freely - h * side * contact / heavy, rubbing)
+            moved = _carry(guide_step, carried, state, pushed, outer + side * contact)
+            distance = rotor[0] + h * speed - moved[0]
+    return (rotor[0] + h * speed, speed), moved
