@@ -486,7 +486,9 @@ RELAXED, BRISTLE_RAIL, BRISTLE_ROD = range(5, 8)  # Relaxed deflection of the ty
 RAIL_END, ROD_END = range(8, 10)  # Trailing ends of the play of rail and rod.
 GROUND_YIELD, STRUCTURE_YIELD = range(10, 12)  # Yielding of the plates.
 GROUND_BEFORE, STRUCTURE_BEFORE = range(12, 14)  # The same a step ago.
-ACCELERATION, CELL, STEPS = range(14, 17)  # Acceleration of the carriage, load cell, steps so far.
+ACCELERATION, CELL_FORCE, STEPS = range(
+    14, 17
+)  # Acceleration of the carriage, load cell, steps so far.
 GROUND_PISTON, STRUCTURE_PISTON = range(17, 19)  # Pistons of the cylinders.
 
 
@@ -523,7 +525,7 @@ def at_rest(
     body.memories[1, 2], body.memories[2, 2] = first[1], first[2]
     motion = body.motion
     motion[GROUND], motion[STRUCTURE], motion[POSITION], motion[RAIL_END] = ground, x, x, x
-    motion[FORCE] = motion[CELL] = preload
+    motion[FORCE] = motion[CELL_FORCE] = preload
     motion[GROUND_PISTON], motion[STRUCTURE_PISTON] = ground, x
     return body
 
@@ -534,7 +536,7 @@ def true_values(body: ReferenceBody) -> tuple[float, float, float, float]:
     motion = body.motion
     ground = motion[GROUND] + motion[GROUND_YIELD]
     structure = motion[STRUCTURE] + motion[STRUCTURE_YIELD]
-    return ground, structure, structure - motion[POSITION], motion[CELL]
+    return ground, structure, structure - motion[POSITION], motion[CELL_FORCE]
 
 
 @numba.njit(cache=True, nogil=True)
@@ -711,7 +713,7 @@ def advance_step(truth: Truth, body: ReferenceBody, commands: Array, time: float
     motion[FORCE] += (1.0 - math.exp(-STEP / truth.electrical_lag)) * (
         truth.motor_constant * voltage - motion[FORCE]
     )
-    motion[CELL] = motion[FORCE] + ripple - smooth_rod - rod_force
+    motion[CELL_FORCE] = motion[FORCE] + ripple - smooth_rod - rod_force
     # The yielding of a step ago gives the plate's velocity in the next step.
     motion[GROUND_BEFORE], motion[STRUCTURE_BEFORE] = ground_yield, structure_yield
     motion[GROUND_YIELD] += (
@@ -720,7 +722,7 @@ def advance_step(truth: Truth, body: ReferenceBody, commands: Array, time: float
     if yielding:
         motion[STRUCTURE_YIELD] += STEP * (plate - unloaded)
         # If rod and rail both stick, only the deflection of the plate determines the force.
-        motion[CELL] = load
+        motion[CELL_FORCE] = load
     motion[GROUND], motion[STRUCTURE] = next_ground, next_structure
 
 

@@ -14,7 +14,7 @@ from rigtwin.diagnosis.evidence import despike
 from rigtwin.diagnosis.fit import with_values
 from rigtwin.diagnosis.swing import swings
 from rigtwin.models.quarter_car import Disturbances, QuarterCarModel
-from rigtwin.models.quarter_car_motion import motor_friction, solve_velocity
+from rigtwin.models.quarter_car_step import motor_friction, solve_velocity
 from rigtwin.recording import Recording
 from rigtwin.simulation.loop import run_compiled
 from rigtwin.simulation.plant import initial_yield

@@ -15,8 +15,8 @@ from rigtwin.components.servo import push_law, pusher_of
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Machine, ReplayOf, Row
 from rigtwin.models.commanding import Command, Readings, commands_of
+from rigtwin.models.coupled_joints import CoupledJoints, begin
 from rigtwin.models.demands import list_pushers, list_sensors
-from rigtwin.models.forward_dynamics import ForwardDynamicsModel, begin
 from rigtwin.models.inputs import inputs_of_test
 from rigtwin.models.inverse_twin import SimulatedSignals
 from rigtwin.models.multibody import Multibody
@@ -24,8 +24,8 @@ from rigtwin.models.stepped_twin import IdealSensor, SteppedActuator, SteppedTwi
 from rigtwin.numerics.arrays import Array, has_diverged
 
 
-class ForwardDynamicsTwin(ForwardDynamicsModel):
-    """Forward-dynamics model of a test that is still to be run."""
+class ForwardDynamicsTwin(CoupledJoints):
+    """Coupled joints of a test that is still to be run."""
 
     def _bodies_of(self, plant: Plant) -> Multibody:
         """Return the rigid bodies, with the masses of joints that are described one by one."""

@@ -83,7 +83,7 @@ def kernel(function: Function) -> Function:
     Compiled code uses no Python objects, releases the interpreter lock, and is cached on disk. A
     division by zero gives numpy's result instead of an exception.
     """
-    return _compile(function, {})
+    return _compile(function, counted=True)
 
 
 def loop_kernel(function: Function) -> Function:
@@ -92,11 +92,13 @@ def loop_kernel(function: Function) -> Function:
     Its arrays belong to its caller, so their references need no counting. Counting them takes
     longer than the arithmetic of a step wherever a tuple of arrays is passed on.
     """
-    return _compile(function, {"_nrt": False})
+    return _compile(function, counted=False)
 
 
-def _compile(function: Function, options: dict[str, bool]) -> Function:
-    compiled: Any = numba.njit(nogil=True, error_model="numpy", **options)(function)
+def _compile(function: Function, counted: bool) -> Function:
+    """Compile a function, with or without counting the references of arrays."""
+    options: dict[str, Any] = {"nogil": True, "error_model": "numpy", "_nrt": counted}
+    compiled: Any = numba.njit(**options)(function)
     if _CACHE is None:
         return cast(Function, compiled)
     # numba reads the folder when the cache object is made, so it is set only for that moment.
