@@ -12,12 +12,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from experiments.thesis.catalogue import NOTHING_TO_COMPUTE, TABLES, ThesisSelection, covers_figure
 from experiments.thesis.entry import Entry, count_agreeing
-from experiments.thesis.gallery_text import (
-    agreement_lines,
-    shared_sentences,
-    shorten_names,
-    without,
-)
+from experiments.thesis.gallery_text import agreement_lines, picture_lines, shorten_names
 from experiments.thesis.study import Conclusion, Drawing, ThesisStudy
 from rigtwin import __version__
 from rigtwin.console import table
@@ -224,7 +219,11 @@ def gallery(chapters: Sequence[Chapter], folder: Path, every: bool) -> Path:
     """Write gallery.md and its pictures. Raises RigtwinError if writing fails."""
     entries = [entry for chapter in chapters for entry in chapter.conclusion.entries]
     lines = ["# The thesis reproduced", "", *_GALLERY_HEAD, ""]
-    lines += [f"In all {count_agreeing(entries)} entries agree, statements and figures included."]
+    lines += [
+        f"In all {count_agreeing(entries)} entries agree, statements and figures included. "
+        "`rigtwin reproduce --html thesis.html` has every entry and caption.",
+        "",
+    ]
     lines += agreement_lines(
         (row.table, row.agree, row.why) for row in agreement_by_table(entries, every)
     )
@@ -236,16 +235,13 @@ def gallery(chapters: Sequence[Chapter], folder: Path, every: bool) -> Path:
             drawings = chapter.conclusion.drawings
             if not drawings:
                 continue
-            shared = shared_sentences([drawing.caption for drawing in drawings])
             lines += [f"## {chapter.study.title}", ""]
-            lines += [" ".join(shared), ""] if shared else []
+            shown = []
             for drawing in drawings:
                 name = f"{chapter.study.name}-{drawing.name}.png"
                 (pictures / name).write_bytes(_png(drawing, 70))
-                covers = shorten_names(drawing.covers.split(", "))
-                caption = without(drawing.caption, shared)
-                lines += [f"**{covers}.** {caption}".rstrip(), ""]
-                lines += [f"![{drawing.name}](gallery/{name})", ""]
+                shown.append((shorten_names(drawing.covers.split(", ")), drawing.caption, name))
+            lines += picture_lines(shown)
         out = folder / "gallery.md"
         out.write_text("\n".join(lines), encoding="utf-8")
     except OSError as error:
