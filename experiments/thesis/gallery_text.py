@@ -43,7 +43,7 @@ def _is_next(before: str, now: str) -> bool:
 
 
 def agreement_lines(rows: Iterable[tuple[str, str, str]]) -> list[str]:
-    """Return the tables that agree as a sentence, and a Markdown table of the others by reason.
+    """Return the tables that agree as a sentence, and a table of the others by their first reason.
 
     Parameters
     ----------
@@ -58,7 +58,8 @@ def agreement_lines(rows: Iterable[tuple[str, str, str]]) -> list[str]:
     groups: dict[str, list[tuple[str, str]]] = {}
     for name, agree, why in rows:
         # A bar would end the cell of a Markdown table.
-        groups.setdefault(why.replace("|", "/"), []).append((name, agree))
+        first = why.partition("; ")[0].replace("|", "/")
+        groups.setdefault(first, []).append((name, agree))
     whole = groups.pop("", [])
     lines = []
     if whole:
@@ -73,7 +74,7 @@ def agreement_lines(rows: Iterable[tuple[str, str, str]]) -> list[str]:
 
 
 def picture_lines(pictures: Sequence[tuple[str, str, str]]) -> list[str]:
-    """Return the first picture of a study with its caption, and links to the others.
+    """Return the first picture of a study with its caption's first sentence, and links to others.
 
     Parameters
     ----------
@@ -86,7 +87,8 @@ def picture_lines(pictures: Sequence[tuple[str, str, str]]) -> list[str]:
         Lines of the page.
     """
     covers, caption, file = pictures[0]
-    lines = [f"**{covers}.** {caption}".rstrip(), "", f"![{covers}](gallery/{file})", ""]
+    sentence = re.split(r"(?<=\.) (?=[A-Z])", caption)[0]
+    lines = [f"**{covers}.** {sentence}".rstrip(), "", f"![{covers}](gallery/{file})", ""]
     if len(pictures) > 1:
         links = [f"[{name}](gallery/{file})" for name, _, file in pictures[1:]]
         lines += [f"Also {', '.join(links)}.", ""]
