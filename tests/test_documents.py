@@ -15,6 +15,8 @@ from pathlib import Path
 
 import pytest
 
+import rigtwin
+from rigtwin import components
 from rigtwin.cli import COMMANDS, _parser, main
 from tests.helpers.pages import (
     DOCS,
@@ -29,6 +31,7 @@ from tests.helpers.pages import (
     without_blocks,
 )
 
+MACHINES = ROOT / "docs" / "machines.md"
 WORDS = 15_700
 """Most words of README and docs together, as `wc -w` counts them."""
 README_LINES = 120
@@ -113,6 +116,33 @@ def test_commands_in_sentences_have_these_options(
         for option in rest:
             if option.startswith("-"):
                 assert re.search(rf"(?<![\w-]){option}(?![\w-])", helps[command]), text
+
+
+DRIVE = """<mujoco model="drive"><worldbody><body name="carriage">
+<joint name="carriage" type="slide" axis="1 0 0"/>
+<geom type="box" size="0.1 0.1 0.1" mass="10"/></body></worldbody>
+<actuator><motor name="motor" joint="carriage"/></actuator>
+<sensor><jointpos name="position" joint="carriage"/></sensor></mujoco>"""
+
+
+def test_the_description_that_opens_the_page_of_machines_is_one(tmp_path: Path) -> None:
+    first = next(block for block in blocks(MACHINES) if block.language == "toml")
+    (tmp_path / "drive.xml").write_text(DRIVE, encoding="utf-8")
+    (tmp_path / "drive.toml").write_text(first.text, encoding="utf-8")
+    machine = rigtwin.machine(tmp_path / "drive.toml")
+    assert {"guide", "encoder", "motor", "load"} <= set(machine.components)
+
+
+def test_parameters_of_machines_are_those_of_the_components() -> None:
+    text = MACHINES.read_text(encoding="utf-8")
+    start = text.index("Parameters by element")
+    entries = re.split(r"^- ", text[start : text.index("Other keys:", start)], flags=re.M)[1:]
+    fields = [getattr(one, "_fields", ()) for one in vars(components).values()]
+    known = {name for names in fields if isinstance(names, tuple) for name in names}
+    known |= {"joint", "tendon", "body", "actuator", "sensor", "channel", "unit"}
+    for entry in entries:
+        for name in re.findall(r"`([a-z_0-9]+)`", entry):
+            assert name in known, name
 
 
 def test_the_pages_stay_short() -> None:
