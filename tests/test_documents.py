@@ -203,6 +203,7 @@ SCRIPTS: dict[str, Callable[[Path], None]] = {
     "README.md": hidden_friction,
     "docs/robot_arm.md": nothing,
     "docs/tutorial.md": nothing,
+    "docs/twin.md": nothing,
     "docs/your_robot.md": nothing,
 }
 """Page → what writes the files that its commands read."""
