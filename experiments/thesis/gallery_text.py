@@ -64,7 +64,8 @@ def agreement_lines(rows: Iterable[tuple[str, str, str]]) -> list[str]:
     lines = []
     if whole:
         lines += [f"All entries of {shorten_names([name for name, _ in whole])} agree.", ""]
-    lines += ["| table | entries that agree | why the others do not |", "|---|---|---|"]
+    if groups:
+        lines += ["| table | entries that agree | why the others do not |", "|---|---|---|"]
     for why, members in groups.items():
         counts = [agree for _, agree in members]
         same = len(counts) > 1 and len(set(counts)) == 1
