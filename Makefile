@@ -11,7 +11,7 @@ help:
 	@echo "make test       set up, run all tests but the slow ones"
 	@echo "make test-slow  the slow ones: longer recordings, more of a sort"
 	@echo "make setup      make $(VENV) with everything in it"
-	@echo "make check      ruff, pyright and the contract of imports"
+	@echo "make check      ruff, pyright, the contract of imports, spelling, docstrings, names"
 	@echo "make benchmark  speeds, side by side"
 	@echo "make docs       the pages of docs and a reference of the API: $(OUT)/docs/index.html"
 	@echo "make gallery    the thesis reproduced: docs/gallery.md, its pictures and videos"
@@ -52,6 +52,9 @@ check: setup
 	$(BIN)/ruff format --check .
 	$(BIN)/pyright
 	$(BIN)/lint-imports --no-cache
+	$(BIN)/codespell README.md CONTRIBUTING.md CHANGELOG.md docs/*.md rigtwin controllers experiments referee machines
+	$(BIN)/numpydoc lint rigtwin/api/*.py
+	$(BIN)/python -m pytest -n0 tests/test_language.py tests/test_glossary.py
 
 benchmark: setup
 	$(BIN)/python -m benchmarks

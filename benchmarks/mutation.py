@@ -3,7 +3,7 @@
 
 Every mutant (`benchmarks.mutants`) is put into the imported module in a forked process of its own,
 which runs the tests until the first one fails. The components run as Python, not compiled, so that
-a changed function is the one that the models call. docs/testing.md has the figures.
+a changed function is the one that the models call. CONTRIBUTING.md has the figures.
 """
 
 from __future__ import annotations

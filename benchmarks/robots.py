@@ -28,7 +28,7 @@ REACH = 0.05
 """Distance of the payload from the origin of its link, m."""
 RIGHT = 0.05
 """Largest relative error of a value that counts as found."""
-HEAD = ("model", "joints", "test", "run, s", "Coulomb friction", "payload", "diagnoses, s")
+HEAD = ("model", "joints", "Coulomb friction", "payload")
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,7 @@ def diagnose_hidden(machine: rigtwin.Machine, effect: str, values: Mapping[str, 
         return Trial(f"no: {names}", seconds)
     value = found[effect].parameters[first].value
     hit = abs(value - values[first]) <= RIGHT * abs(values[first])
-    return Trial(f"{'yes' if hit else 'no'}: {value:.3g} of {values[first]:.3g}", seconds)
+    return Trial(f"{'' if hit else 'no: '}{value:.3g} of {values[first]:.3g}", seconds)
 
 
 def try_robot(name: str) -> list[str]:
@@ -107,9 +107,7 @@ def try_robot(name: str) -> list[str]:
     label = "/".join(Path(name).with_suffix("").parts[-2:])
     try:
         machine = rigtwin.machine(name)
-        start = time.perf_counter()
         base = rigtwin.run(machine, "excite", seed=1)
-        ran = time.perf_counter() - start
         guide, friction = hidden_friction(machine, base)
         nominal = float(getattr(machine.plant, guide).coulomb)
         trials = [diagnose_hidden(machine, f"coulomb@{guide}", {"coulomb": nominal + friction})]
@@ -118,12 +116,12 @@ def try_robot(name: str) -> list[str]:
             load = {"payload": link[1], "payload_z": REACH}
             trials.append(diagnose_hidden(machine, f"payload@{link[0]}", load))
     except rigtwin.RigtwinError as error:
-        return [label, "", "", "", str(error).rpartition(": ")[2], "", ""]
-    test = "servos" if machine.replays[0].free else "inverse dynamics"
+        return [label, "", str(error).rpartition(": ")[2], ""]
+    label += ", servos" if machine.replays[0].free else ""
     payload = trials[1].answer if len(trials) > 1 else "no link"
-    seconds = ", ".join(f"{trial.seconds:.0f}" for trial in trials)
+    print(f"{label}: diagnoses of {', '.join(f'{trial.seconds:.0f} s' for trial in trials)}")
     joints = sum(_is(machine, component, Guide) for component in machine.components)
-    return [label, str(joints), test, f"{ran:.1f}", trials[0].answer, payload, seconds]
+    return [label, str(joints), trials[0].answer, payload]
 
 
 def table(rows: Iterator[list[str]]) -> Iterator[str]:

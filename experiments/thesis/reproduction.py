@@ -12,6 +12,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from experiments.thesis.catalogue import NOTHING_TO_COMPUTE, TABLES, ThesisSelection, covers_figure
 from experiments.thesis.entry import Entry, count_agreeing
+from experiments.thesis.gallery_text import agreement_lines, picture_lines, shorten_names
 from experiments.thesis.study import Conclusion, Drawing, ThesisStudy
 from rigtwin import __version__
 from rigtwin.console import table
@@ -170,6 +171,16 @@ def document(chapters: Sequence[Chapter], every: bool) -> dict[str, object]:
     }
 
 
+_GALLERY_HEAD = (
+    "`make gallery` writes this page. Every figure is of the nominal twin or in closed form. "
+    "Nothing is tuned to the thesis but",
+    "the gains of the force loop of Tables 4.1 and 4.2, which are found from the first row alone.",
+    "",
+    "Videos: [drop](gallery/drop.mp4), [road](gallery/road10.mp4), [beams](gallery/beams.mp4).",
+)
+"""First lines of the gallery's page."""
+
+
 def _png(drawing: Drawing, dots_per_inch: int) -> bytes:
     """Return a drawing as PNG."""
     stream = io.BytesIO()
@@ -206,47 +217,31 @@ def page(chapters: Sequence[Chapter], every: bool) -> str:
 
 def gallery(chapters: Sequence[Chapter], folder: Path, every: bool) -> Path:
     """Write gallery.md and its pictures. Raises RigtwinError if writing fails."""
-    lines = ["# The thesis reproduced", ""]
-    lines += [
-        "Made by `make gallery`. Every figure is of the nominal twin or "
-        "in closed form. Nothing is tuned to the thesis but"
-    ]
-    lines += [
-        "the gains of the force loop of Tables 4.1 and 4.2, "
-        "which are found from the first row alone."
-    ]
-    lines += [
-        "",
-        "Videos: [drop](gallery/drop.mp4), [road](gallery/road10.mp4), [beams](gallery/beams.mp4).",
-        "",
-    ]
     entries = [entry for chapter in chapters for entry in chapter.conclusion.entries]
-    lines += ["| table | entries that agree | why the others do not |", "|---|---|---|"]
+    lines = ["# The thesis reproduced", "", *_GALLERY_HEAD, ""]
     lines += [
-        # A bar would end the cell of a Markdown table.
-        f"| {row.table} | {row.agree} | {row.why.replace('|', '/')} |"
-        for row in agreement_by_table(entries, every)
-    ]
-    lines += [
-        "",
-        f"In all {count_agreeing(entries)} entries agree, "
-        "statements of the text and figures included.",
+        f"In all {count_agreeing(entries)} entries agree, statements and figures included. "
+        "`rigtwin reproduce --html thesis.html` has every entry and caption.",
         "",
     ]
+    lines += agreement_lines(
+        (row.table, row.agree, row.why) for row in agreement_by_table(entries, every)
+    )
+    lines += [""]
     pictures = folder / "gallery"
     try:
         pictures.mkdir(parents=True, exist_ok=True)
         for chapter in chapters:
+            drawings = chapter.conclusion.drawings
+            if not drawings:
+                continue
             lines += [f"## {chapter.study.title}", ""]
-            for drawing in chapter.conclusion.drawings:
+            shown = []
+            for drawing in drawings:
                 name = f"{chapter.study.name}-{drawing.name}.png"
                 (pictures / name).write_bytes(_png(drawing, 70))
-                lines += [
-                    f"**{drawing.covers}.** {drawing.caption}",
-                    "",
-                    f"![{drawing.covers}](gallery/{name})",
-                    "",
-                ]
+                shown.append((shorten_names(drawing.covers.split(", ")), drawing.caption, name))
+            lines += picture_lines(shown)
         out = folder / "gallery.md"
         out.write_text("\n".join(lines), encoding="utf-8")
     except OSError as error:

@@ -1,5 +1,4 @@
-"""Data acquisition card: a virtual card on a port, the check of a channel table, the release of
-lines that a dead program holds."""
+"""Data acquisition card: virtual card, check of a channel table, release of held lines."""
 
 from __future__ import annotations
 
@@ -281,7 +280,20 @@ def check_card(
 
 
 def write_table(table: ChannelTable, path: str | Path) -> None:
-    """Write a channel table, TOML. Raises RigtwinError if the file cannot be written."""
+    """Write a channel table as TOML.
+
+    Parameters
+    ----------
+    table
+        Channel table, such as that of `TableCheck`.
+    path
+        File to write; replaced if it exists.
+
+    Raises
+    ------
+    RigtwinError
+        If the file cannot be written.
+    """
     atomic_write(Path(path), to_toml(table))
 
 

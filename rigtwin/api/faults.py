@@ -47,7 +47,7 @@ class Campaign:
 
     @property
     def failed(self) -> tuple[FaultResult, ...]:
-        """Results of sessions that were not stopped as required."""
+        """Return the results of sessions that were not stopped as required."""
         return tuple(result for result in self.results if not result.ok)
 
 

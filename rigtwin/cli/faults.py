@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -35,6 +35,15 @@ HEADER = (
     "reason",
     "readable",
 )
+PAGE_HEADER = (
+    "where",
+    "what breaks",
+    "stopped",
+    "never seen",
+    "ticks to safe, at most",
+    "of a limit, at most",
+)
+"""Columns of the table that `--out` writes: one row for each place."""
 MARK = "<!-- made by rigtwin faults -->"
 """In a page that has this line, everything after it is replaced."""
 
@@ -113,7 +122,7 @@ def execute(parsed: argparse.Namespace) -> int:
     if campaign.interrupted:
         return 130
     if parsed.out is not None:
-        _write(parsed.out, said, rows, list(campaign.failed))
+        _write(parsed.out, said, _page_rows(tried), list(campaign.failed))
     if parsed.json is not None:
         write_json(parsed.json, [asdict(result) for result in campaign.results])
     return 0 if not campaign.failed and not campaign.undone else 4
@@ -138,6 +147,27 @@ def _row(kind: FaultKind, results: list[FaultResult]) -> tuple[str, ...]:
     )
 
 
+def _page_rows(tried: Mapping[FaultKind, list[FaultResult]]) -> list[tuple[str, ...]]:
+    """Return a row for each place: its kinds of fault, and the worst of their sessions."""
+    rows = []
+    for place in dict.fromkeys(kind.place for kind in tried):
+        kinds = [kind for kind, results in tried.items() if kind.place == place and results]
+        results = [result for kind in kinds for result in tried[kind]]
+        late = [result.late for result in results if result.late is not None]
+        if results:
+            rows.append(
+                (
+                    place,
+                    "; ".join(f"{kind.name}: {kind.meaning}" for kind in kinds),
+                    f"{len(late)} of {len(results)}",
+                    str(len(results) - len(late)),
+                    str(max(0, *late)) if late else "",
+                    f"{100 * max(result.exceeded for result in results):.0f} %",
+                )
+            )
+    return rows
+
+
 def _describe(result: FaultResult) -> str:
     fault = result.fault
     return (
@@ -148,11 +178,15 @@ def _describe(result: FaultResult) -> str:
     )
 
 
+def _table_line(cells: tuple[str, ...]) -> str:
+    return "| " + " | ".join(cells) + " |"
+
+
 def _write(
     path: Path, said: str, rows: Iterable[tuple[str, ...]], failed: list[FaultResult]
 ) -> None:
-    lines = [said + ".", "", "| " + " | ".join(HEADER) + " |", "|" + "---|" * len(HEADER)]
-    lines += ["| " + " | ".join(row) + " |" for row in rows]
+    lines = [said + ".", "", _table_line(PAGE_HEADER), "|" + "---|" * len(PAGE_HEADER)]
+    lines += [_table_line(row) for row in rows]
     lines += ["", *(f"- failed: {_describe(result)}" for result in failed)]
     try:
         old = path.read_text(encoding="utf-8") if path.is_file() else ""
