@@ -171,7 +171,7 @@ def test_the_joint_alone_goes_as_in_mujoco_and_so_does_its_twin(tmp_path: Path) 
     machine = machine_in(tmp_path, ONE, text)
     (replay,) = machine.replays
     reference = MujocoModel(machine, replay, recording.inputs, machine.configuration, 16)
-    found = reference.predict(machine.plant)[0]
+    found = reference.move(machine.plant)[0]
     assert np.std(found - recording["/sensor.shoulder"]) < 0.002 * np.std(found)
     demanded = {"shoulder": commanded(recording.time)["shoulder"]}
     twin = rigtwin.run(machine, lambda *_: demanded, settings={"timing": {"period": PERIOD}})

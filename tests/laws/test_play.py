@@ -9,6 +9,7 @@ import pytest
 from rigtwin.components import Guide, Servo
 from rigtwin.numerics.arrays import Array
 from tests.laws.joints import INTERPRETED, PERIOD, motion_under
+from tests.laws.written import law_of
 
 INERTIA, GAIN, DAMPING, PLAY = 0.03, 25.0, 1.0, 0.08
 TWO_MASSES = """
@@ -55,6 +56,7 @@ def angles_in_mujoco(command: Array, share: float, friction: float) -> Array:
     return angles
 
 
+@law_of("backlash", Servo)
 @pytest.mark.skipif(INTERPRETED, reason="calls MuJoCo")
 @pytest.mark.parametrize("share", [0.2, 0.6])
 @pytest.mark.parametrize("friction", [0.0, 0.5])
