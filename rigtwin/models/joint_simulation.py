@@ -175,12 +175,8 @@ class JointSimulation:
 
     def _armature(self, plant: Plant) -> float:
         """Return the inertia of the rotor behind its gear, kg or kg m²."""
-        rotor = self._replay.rotor
-        return (
-            self._replay.joint.armature
-            if rotor is None
-            else component_of(plant, rotor, Rotor).inertia
-        )
+        rotor, joint = self._replay.rotor, self._replay.joint
+        return joint.armature if rotor is None else component_of(plant, rotor, Rotor).inertia
 
     def _key(self, plant: Plant) -> tuple[object, ...]:
         """Return all components that the motion depends on, as a key of remembered motions."""

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from controllers.compiled import inlined
+from controllers.compiled import compilable
 from rigtwin.components import Computer, Cylinder, RigPlant
 from rigtwin.components.conditioning import Actuator, ActuatorState, actuator, condition, hold
 from rigtwin.components.cylinder import (
@@ -117,7 +117,7 @@ def move_plate(
     return out
 
 
-@inlined
+@compilable
 def plate_velocity(plate: PlateMotion, tick: int, place: int, trial: bool, rate: float) -> float:
     """Return the unloaded velocity of a plate over the step from `place`, m/s.
 

@@ -18,6 +18,7 @@ from rigtwin.components.guide import damping, dry_limits, friction, position_for
 from rigtwin.components.guide_step import guide_step_of
 from rigtwin.components.mount import MountState, give_way
 from rigtwin.components.plant import Plant
+from rigtwin.components.sensors import apply_sensor, sensor_of
 from rigtwin.components.servo import pull, push, push_law, pusher_of
 from rigtwin.description.control import FormulaControl
 from rigtwin.models.commanding import (
@@ -26,6 +27,7 @@ from rigtwin.models.commanding import (
     command_by_formula,
     commands_of,
 )
+from rigtwin.models.joint import PLACES
 from rigtwin.models.joint_motion import Inertia
 from rigtwin.models.joint_simulation import JointSimulation
 from rigtwin.numerics.arrays import Array
@@ -43,6 +45,16 @@ OFF = (
 
 class MujocoModel(JointSimulation):
     """One joint of a machine in MuJoCo."""
+
+    def predict(self, plant: Plant) -> Array:
+        """The readings of the observed sensors, without noise."""
+        moved, rows = self.move(plant), self._replay.rows
+        return np.stack(
+            [
+                apply_sensor(sensor_of(plant, row.name), moved[PLACES[row.kind]], self._period)
+                for row in rows
+            ]
+        )
 
     def _mechanics(
         self, plant: Plant, timestep: float
