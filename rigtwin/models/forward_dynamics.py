@@ -68,6 +68,7 @@ class ForwardDynamicsModel(Model[Plant]):
         steps: int,
         every: int = 1,
         quick: bool = False,
+        start: InitialState | None = None,
     ) -> None:
         """Prepare the model.
 
@@ -79,6 +80,9 @@ class ForwardDynamicsModel(Model[Plant]):
             Ticks of the recording for each tick of `inputs`.
         quick
             Whether errors of the start are linear nuisance parameters instead of being fitted.
+        start
+            Judged initial state of the same recording at the same ticks. Default: it is judged,
+            which takes as many predictions as there are free positions and velocities.
 
         Raises
         ------
@@ -119,7 +123,10 @@ class ForwardDynamicsModel(Model[Plant]):
         self._changed: dict[tuple[object, ...], Multibody] = {}
         self._last: dict[tuple[object, ...], Array] = {}
         self._starts: dict[tuple[object, ...], Array] = {}
-        self._judge_start()
+        if start is None:
+            self._judge_start()
+        else:
+            self._start = start
 
     def _read_motions(self, inputs: Inputs) -> None:
         """Smooth the prescribed motions and collect the sensors that show the initial state."""
@@ -153,6 +160,8 @@ class ForwardDynamicsModel(Model[Plant]):
             steps,
             self.every,
             self._quick,
+            # How well the start is known hardly depends on the integration steps.
+            self._start,
         )
 
     def thin(self, longest: float) -> ForwardDynamicsModel:
