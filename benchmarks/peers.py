@@ -22,7 +22,7 @@ import argparse
 import time
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -54,8 +54,6 @@ BAND, EVERY = 25.0, 5
 """Band of the comparison, Hz, and ticks between two samples of regression and network."""
 INDEPENDENT = 2.0 * BAND * PERIOD
 """Share of the ticks that are independent: a band-limited residual has 2·B per second."""
-ITERATIONS = 4
-"""Iterations of a fit of one candidate: the forces are linear in nearly all of them."""
 DECISIVE = 10.0
 """BIC by which a candidate has to beat the nominal model; "very strong" by Kass and Raftery."""
 THRESHOLDS = np.geomspace(0.01, 1.0, 25)
@@ -306,16 +304,20 @@ def try_toolbox(problem: Problem) -> Attempt:
     )
     count = INDEPENDENT * measured.size
 
-    def squares(parameters: Sequence[ToolboxParameter], values: Mapping[str, float]) -> float:
+    def squares(
+        posed: InverseProblem, parameters: Sequence[ToolboxParameter], values: Mapping[str, float]
+    ) -> float:
         vector = np.array([values[p.effect] for p in parameters])
-        parts, _, _ = residual(vector, list_parameters(parameters))
+        parts, _, _ = posed(vector, list_parameters(parameters))
         return float(np.mean(parts[0] ** 2))
 
     best: tuple[float, Candidate | None, dict[str, float]]
-    best = (bic(squares((), {}), count, 0) - DECISIVE, None, {})
+    best = (bic(squares(residual, (), {}), count, 0) - DECISIVE, None, {})
     for candidate in list_candidates(problem, spec, swings):
-        values = fit_toolbox(candidate.parameters, residual, ITERATIONS)
-        score = bic(squares(candidate.parameters, values), count, len(values))
+        # The toolbox writes the values into the spec that it is given.
+        posed = replace(residual, spec=spec.copy())
+        values = fit_toolbox(candidate.parameters, posed, "scipy")
+        score = bic(squares(posed, candidate.parameters, values), count, len(values))
         if score < best[0]:
             best = (score, candidate, values)
     seconds = time.process_time() - start
@@ -572,7 +574,7 @@ A machine without a defect is right if nothing is named. A name beside the right
 
 The candidates of `mujoco.sysid` are Coulomb and viscous friction, stiffness, constant force and
 armature of each joint, payload, gains and zeros of the sensors: one fit each in inverse dynamics,
-BIC with the number of independent samples. Stribeck peaks, which an MJCF cannot say, are added to
+by its scipy backend, and BIC with the number of independent samples. Stribeck peaks, which an MJCF cannot say, are added to
 its predictions. It has no tolerances: friction that is 2 % off is an effect to it. A pair of
 effects would need a fit for each pair. The sparse regression is pysindy's STLSQ on the residual
 torque; the network has two layers of 32. Both see the residual about rigtwin's nominal prediction.

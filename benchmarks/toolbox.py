@@ -15,7 +15,7 @@ import contextlib
 import io
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal
 
 import mujoco
 import numpy as np
@@ -27,6 +27,8 @@ from rigtwin.signals.band import limit_band
 
 UNCERTAIN_ENDS = 0.3
 """Time at both ends of a record in which the filtered motion is uncertain, s."""
+Optimizer = Literal["mujoco", "scipy"]
+"""Optimisers of the toolbox; the first is its default."""
 Residual = Callable[..., tuple[list[Array], Any, Any]]
 """Residual as `mujoco.sysid.optimize` calls it: of a vector or of columns, and of parameters."""
 
@@ -132,15 +134,17 @@ def list_parameters(parameters: Sequence[ToolboxParameter]) -> Any:
     return result.move_off_bounds(fraction=0.01)
 
 
-def fit_toolbox(parameters: Sequence[ToolboxParameter], residual: Residual) -> dict[str, float]:
-    """Fit parameters with the toolbox's default optimiser, and return their values by effect."""
+def fit_toolbox(
+    parameters: Sequence[ToolboxParameter], residual: Residual, optimizer: Optimizer = "mujoco"
+) -> dict[str, float]:
+    """Fit parameters with one of the toolbox's optimisers, and return their values by effect."""
     from mujoco import sysid
 
     start = list_parameters(parameters)
     # Its optimiser prints each iteration whatever `verbose` says, and divides by a step's predicted
     # gain, which may be 0 at the optimum.
     with contextlib.redirect_stdout(io.StringIO()), np.errstate(all="ignore"):
-        fitted, _ = sysid.optimize(start, residual, verbose=False, max_iters=iterations)
+        fitted, _ = sysid.optimize(start, residual, optimizer, verbose=False)
     return {p.effect: float(fitted[p.effect].value[0]) for p in parameters}
 
 
