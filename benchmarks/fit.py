@@ -198,9 +198,11 @@ def pose_moved() -> Contest:
         "moved",
         "arm of two joints, moved as measured, 12 s at 500 Hz",
         machine,
-        *recordings,
+        recordings[0],
+        recordings[1],
         tuple(parameters),
-        *(pose(recording) for recording in recordings),
+        pose(recordings[0]),
+        pose(recordings[1]),
         truth,
     )
 
@@ -299,9 +301,11 @@ def pose_free(folder: Path) -> Contest:
         "free",
         "arm of two joints on position servos, 10 s at 500 Hz",
         machine,
-        *recordings,
+        recordings[0],
+        recordings[1],
         tuple(parameters),
-        *residuals,
+        residuals[0],
+        residuals[1],
         HIDDEN,
     )
 
@@ -337,9 +341,11 @@ def pose_emps(data: Path, folder: Path) -> Contest:
         "emps",
         "EMPS, a real drive in its closed loop, 25 s at 1 kHz",
         machine,
-        *recordings,
+        recordings[0],
+        recordings[1],
         parameters,
-        *residuals,
+        residuals[0],
+        residuals[1],
     )
 
 
@@ -445,7 +451,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, help="file of the tables, Markdown")
     parsed = parser.parse_args()
     if missing := find_missing():
-        parser.exit(1, f"mujoco.sysid needs {missing}; pip install 'mujoco[sysid]'\n")
+        parser.exit(1, f"mujoco.sysid needs {missing}; pip install 'rigtwin[peers]'\n")
     lines: list[str] = []
     with tempfile.TemporaryDirectory() as work:
         folder = Path(work)

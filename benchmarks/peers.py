@@ -13,7 +13,7 @@ recording of the same machine judges what it predicts.
   each function that is kept counts as a name.
 - *network*: a multilayer perceptron on the residual torque. It names nothing.
 
-pip install 'mujoco[sysid]' pysindy scikit-learn; what is missing is left out with a line.
+pip install 'rigtwin[peers]'; what is missing is left out with a line.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ import time
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -411,8 +412,7 @@ def functions_of(problem: Problem, data: Residuals, row: int) -> dict[str, Array
 
 def try_regression(problem: Problem) -> Attempt:
     """Regress each joint's residual torque with pysindy's STLSQ, the threshold by BIC."""
-    import pysindy
-
+    pysindy: Any = import_module("pysindy")
     data, judged = (residuals_of(problem, r) for r in (problem.fitted, problem.held_out))
     start = time.process_time()
     names: set[str] = set()
@@ -447,8 +447,7 @@ def try_regression(problem: Problem) -> Attempt:
 
 def try_network(problem: Problem) -> Attempt:
     """Teach a network of two layers of 32 the residual torque, from the joints' motion."""
-    from sklearn.neural_network import MLPRegressor
-
+    neural_network: Any = import_module("sklearn.neural_network")
     data, judged = (residuals_of(problem, r) for r in (problem.fitted, problem.held_out))
     start = time.process_time()
 
@@ -460,7 +459,7 @@ def try_network(problem: Problem) -> Attempt:
     columns, target = inputs(data), data.residual.T
     middle, scale = np.mean(columns, axis=0), np.std(columns, axis=0)
     zero, size = np.mean(target, axis=0), np.std(target, axis=0)
-    network = MLPRegressor(
+    network = neural_network.MLPRegressor(
         hidden_layer_sizes=(32, 32), alpha=1e-3, early_stopping=True, max_iter=500, random_state=0
     ).fit((columns - middle) / scale, (target - zero) / size)
     learned = network.predict((inputs(judged) - middle) / scale) * size + zero
@@ -500,7 +499,7 @@ def list_methods() -> Iterator[str]:
         elif name != "rigtwin":
             package = "pysindy" if name.startswith("sparse") else "sklearn"
             try:
-                __import__(package)
+                import_module(package)
             except ModuleNotFoundError as error:
                 missing = str(error.name)
         if missing:
@@ -556,7 +555,7 @@ def details(results: Mapping[str, list[tuple[Problem, Attempt]]]) -> list[str]:
 
 TEXT = """# Why not just least squares
 
-    pip install 'mujoco[sysid]' pysindy scikit-learn
+    pip install 'rigtwin[peers]'
     {command}
 
 wrote this page: {count} arms and carts of the referee, moved as measured, 12 s at 500 Hz, with one
@@ -574,10 +573,11 @@ A machine without a defect is right if nothing is named. A name beside the right
 
 The candidates of `mujoco.sysid` are Coulomb and viscous friction, stiffness, constant force and
 armature of each joint, payload, gains and zeros of the sensors: one fit each in inverse dynamics,
-by its scipy backend, and BIC with the number of independent samples. Stribeck peaks, which an MJCF cannot say, are added to
-its predictions. It has no tolerances: friction that is 2 % off is an effect to it. A pair of
-effects would need a fit for each pair. The sparse regression is pysindy's STLSQ on the residual
-torque; the network has two layers of 32. Both see the residual about rigtwin's nominal prediction.
+by its scipy backend, and BIC with the number of independent samples. Stribeck peaks, which an MJCF
+cannot say, are added to its predictions. It has no tolerances: friction that is 2 % off is an
+effect to it. A pair of effects would need a fit for each pair. The sparse regression is pysindy's
+STLSQ on the residual torque; the network has two layers of 32. Both see the residual about
+rigtwin's nominal prediction.
 """
 
 

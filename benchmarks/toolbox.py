@@ -1,6 +1,6 @@
 """MuJoCo's system identification toolbox, `mujoco.sysid`, on the machines of this project.
 
-The toolbox is part of `mujoco`; what it imports besides comes with `pip install 'mujoco[sysid]'`.
+The toolbox is part of `mujoco`; what it imports besides comes with `pip install 'rigtwin[peers]'`.
 It fits what an MJCF can say: friction loss, damping, stiffness, inertias. Two kinds of test are
 posed to it:
 
