@@ -210,7 +210,10 @@ def fit_effects(
         raise RigtwinError(
             f"{names}: an effect lacks what it acts through, as play lacks dry friction"
         )
-    coarse = Fitter(evidence.thin().halve_steps())
+    exact = Fitter(evidence)
+    thinned = evidence.thin().halve_steps()
+    # A model that integrates nothing has nothing coarser.
+    coarse = exact if thinned.models == evidence.models else Fitter(thinned)
     optima: list[Fit] = []
     for start in _list_starts(coarse, effects, progress):
         optima.append(coarse.refine(effects, start))
@@ -219,7 +222,6 @@ def fit_effects(
             break
     settled = _is_settled(coarse, optima)
     optima.sort(key=lambda fit: fit.misfit)
-    exact = Fitter(evidence)
     # A settled optimum needs no further starts nearby.
     restarts = () if settled else PERTURBATIONS
     fit = exact.refit_with_tolerances(optima[0], restarts)
