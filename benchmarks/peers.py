@@ -540,6 +540,23 @@ def summary(results: Mapping[str, list[tuple[Problem, Attempt]]]) -> list[str]:
     return lines
 
 
+def remark(results: Mapping[str, list[tuple[Problem, Attempt]]]) -> str:
+    """Return which methods predict best and take least, in a sentence."""
+    medians = {
+        name: (
+            float(np.median([100.0 * attempt.held_out for _, attempt in pairs])),
+            float(np.median([attempt.seconds for _, attempt in pairs])),
+        )
+        for name, pairs in results.items()
+    }
+    closest = min(medians, key=lambda name: medians[name][0])
+    fastest = min(medians, key=lambda name: medians[name][1])
+    return (
+        f"The least held-out error is that of the {closest} ({medians[closest][0]:.2f} %), the "
+        f"least time that of the {fastest} ({medians[fastest][1]:.1f} s)."
+    )
+
+
 def details(results: Mapping[str, list[tuple[Problem, Attempt]]]) -> list[str]:
     """Return the lines of the table of machines."""
     lines = [f"| machine | withheld | {' | '.join(results)} |", "|---|---|" + "---|" * len(results)]
@@ -568,6 +585,7 @@ machine, imports apart.
 {summary}
 
 A machine without a defect is right if nothing is named. A name beside the right one is wrong.
+{remark}
 
 {details}
 
@@ -612,6 +630,7 @@ def main() -> None:
         "count": parsed.cases,
         "floor": float(np.median(nominal)) if nominal else float("nan"),
         "summary": "\n".join(summary(results)),
+        "remark": remark(results),
         "details": "\n".join(details(results)),
     }
     print("\n".join(summary(results)))

@@ -129,6 +129,7 @@ def test_the_table_counts_what_each_method_said():
         )
     ]
     row = peers.summary({"method": pairs})[-1]
+    assert peers.remark({"method": pairs}).endswith("the least time that of the method (2.0 s).")
     assert row == "| method | 1 of 3 | 1 of 2 | 0 of 2 | 1 of 1 | 1.00 % (1.00) | 2.0 |"
 
 
