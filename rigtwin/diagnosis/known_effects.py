@@ -286,16 +286,18 @@ def _list_starts(
 def _is_settled(fitter: Fitter, optima: Sequence[Fit]) -> bool:
     """Return whether no further start can find another optimum of effects with linear forces.
 
-    The first fit leaves no more than noise, or all fits agree.
+    The first fit leaves no more than noise, or all fits agree. Where the model leaves more than
+    noise, the rest counts as noise.
     """
-    first = optima[0]
+    first, expected = optima[0], fitter.evidence.expected
     if any(effect.kind.name not in LINEAR for effect in first.effects):
         return False
-    if first.misfit < SUFFICIENT_MISFIT * fitter.evidence.expected:
+    if first.misfit < SUFFICIENT_MISFIT * expected:
         return True
+    excess = max(first.misfit / expected, 1.0)
     return len(optima) > 1 and all(
-        abs(rival.misfit - first.misfit) < TIED
-        and np.all(np.abs(np.subtract(a, b)) <= np.asarray(width))
+        abs(rival.misfit - first.misfit) < TIED * excess
+        and np.all(np.abs(np.subtract(a, b)) <= np.sqrt(excess) * np.asarray(width))
         for rival in optima[1:]
         for a, b, width in zip(first.values, rival.values, first.widths, strict=True)
     )
