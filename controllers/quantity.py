@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import IntEnum
+from functools import cache
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 
@@ -51,6 +53,12 @@ class Choice(IntEnum):
 
 def fields(group: type) -> dict[str, Quantity | type[Choice]]:
     """Return the Quantity or Choice of every leaf field of a NamedTuple class, by name."""
+    return dict(_read_fields(group))
+
+
+@cache
+def _read_fields(group: type) -> Mapping[str, Quantity | type[Choice]]:
+    """Return the same once per class: its annotations are parsed anew at each call."""
     meanings: dict[str, Quantity | type[Choice]] = {}
     for name, hint in get_type_hints(group, include_extras=True).items():
         if get_origin(hint) is Annotated:

@@ -42,6 +42,21 @@ def test_held_out_errors_shrink_as_those_of_the_fit(fitted):
     assert fitted.warnings == ()
 
 
+def test_effects_with_linear_forces_need_one_start(recordings, fitted):
+    counts: list[int] = []
+    again = rigtwin.fit(recordings[0], list(HIDDEN), progress=counts.append)
+    assert again.parameters == fitted.parameters
+    # One coarse fit that leaves noise, and the final one.
+    assert sum(counts) <= 3
+
+
+def test_the_start_of_other_effects_is_searched_for(recordings):
+    counts: list[int] = []
+    fitted = rigtwin.fit(recordings[0], [*HIDDEN, "gain@torque_2"], progress=counts.append)
+    assert sum(counts) > 3
+    assert fitted["coulomb@elbow"].value == pytest.approx(HIDDEN["coulomb@elbow"], rel=0.05)
+
+
 def test_the_corrected_machine_has_the_values(fitted):
     assert fitted.machine.plant.elbow.coulomb == fitted["coulomb@elbow"].value
 

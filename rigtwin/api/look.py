@@ -13,7 +13,7 @@ from rigtwin.api.watching import PATIENCE, watch
 from rigtwin.description.machine import Machine
 from rigtwin.errors import RigtwinError
 from rigtwin.looking import Look
-from rigtwin.looking.starting_point import from_alarm, read_diagnosis
+from rigtwin.looking.starting_point import from_alarm, from_first_look, read_diagnosis
 from rigtwin.recording import reader
 from rigtwin.watching import Watch
 
@@ -84,7 +84,8 @@ def show_look(
         Port of the page on this computer; other computers cannot reach it. 0, the default, takes a
         free port.
     diagnosis
-        JSON file of a diagnosis of the same recording. The page starts with its effects.
+        JSON file of a diagnosis of the same recording. The page starts with its effects. By default
+        it starts with the suspects of a first look, which takes a second or two.
     save_twin
         File that the page's save button writes, TOML. Defaults to RECORDING_twin.toml in the
         working folder.
@@ -100,7 +101,7 @@ def show_look(
         If the port is in use, the diagnosis is of another recording, or the package viser is
         missing.
     """
-    start = None if diagnosis is None else read_diagnosis(diagnosis, look)
+    start = from_first_look(look) if diagnosis is None else read_diagnosis(diagnosis, look)
     with _needs_viser():
         from rigtwin.looking.local_server import open_server
         from rigtwin.looking.page import Page

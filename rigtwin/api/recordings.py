@@ -107,10 +107,15 @@ class Recording(reader.Recording):
         Raises
         ------
         RigtwinError
-            If this computer cannot draw, the file cannot be written, or a ghost is asked for and
-            the twin cannot be compared with the recording.
+            If this computer cannot draw, the package av is missing, the file cannot be written, or
+            a ghost is asked for and the twin cannot be compared with the recording.
         """
-        from rigtwin.render.video import film  # Imported late: scipy.signal takes a second.
+        try:
+            from rigtwin.render.video import film  # Imported late: scipy.signal takes a second.
+        except ModuleNotFoundError as error:
+            if error.name != "av":
+                raise
+            raise RigtwinError("videos need av: pip install 'rigtwin[video]'") from None
 
         machine = machine_of(self)
         if not 0.0 <= ghost < math.inf:

@@ -91,6 +91,7 @@ class Fitter:
         self.evidence, self.plant = evidence, evidence.plant
         self.swing = swings(evidence.machine, evidence.recordings)
         self._scales: dict[str, Scales] = {}
+        self._starts: dict[Effect, Starts] = {}
         self._nominal_residual = evidence.residual(evidence.plant)
         self._responses: dict[Effect, Responses] = {}
         self._beside: dict[tuple[object, ...], Responses] = {}
@@ -109,7 +110,9 @@ class Fitter:
 
     def starts(self, effect: Effect) -> Starts:
         """Return the values from which a search for an effect starts."""
-        return self._starts_at(effect, self.plant)
+        if effect not in self._starts:
+            self._starts[effect] = self._starts_at(effect, self.plant)
+        return self._starts[effect]
 
     def _starts_at(self, effect: Effect, plant: Plant) -> Starts:
         swing = self.swing.get(effect.component, Swing())
@@ -381,7 +384,7 @@ class Fitter:
         )
         return ((*scaled, *start[count:]),)
 
-    def refit_with_tolerances(self, fit: Fit) -> Fit:
+    def refit_with_tolerances(self, fit: Fit, restarts: Sequence[float] = PERTURBATIONS) -> Fit:
         """Refit effects with the responses to the tolerances taken at the fit.
 
         Estimate and refit alternate. Mechanical tolerances act nonlinearly beside dry friction, so
@@ -391,6 +394,8 @@ class Fitter:
         ----------
         fit
             Fit about the nominal plant.
+        restarts
+            Factors of a fitted value from which the fit is repeated.
 
         Returns
         -------
@@ -412,12 +417,13 @@ class Fitter:
             space = Space(
                 self.evidence, with_values(base, fit.effects, fit.values), used, fit.effects
             )
-            fit = self._perturb(self.refine(fit.effects, fit.values, space, base), space, base)
+            refined = self.refine(fit.effects, fit.values, space, base)
+            fit = self._perturb(refined, space, base, restarts)
             residual = self.evidence.residual(with_values(base, fit.effects, fit.values))
             fit = replace(fit, base=base, used=tuple(used.tolist()))
         return fit
 
-    def _perturb(self, fit: Fit, space: Space, base: Plant) -> Fit:
+    def _perturb(self, fit: Fit, space: Space, base: Plant, restarts: Sequence[float]) -> Fit:
         """Restart nearby: stick-slip makes the misfit discontinuous.
 
         Each value is changed in turn by a few per cent, and refined again where that alone already
@@ -427,7 +433,7 @@ class Fitter:
             return fit
         for number, effect in enumerate(fit.effects):
             fitted = len(effect.kind.parameters) - len(effect.kind.constants)
-            for place, share in product(range(fitted), PERTURBATIONS):
+            for place, share in product(range(fitted), restarts):
                 perturbed = list(fit.values[number])
                 # Magnitudes are scaled about their nominal value, shapes and limits about 0.
                 from_zero = place > 0 or effect.kind.name in LIMITS

@@ -13,10 +13,11 @@ from rigtwin.components.library import find
 from rigtwin.components.plant import Plant
 from rigtwin.description.machine import Machine
 from rigtwin.description.mjcf import Change, write_mjcf
+from rigtwin.diagnosis.balance import balance_forces
 from rigtwin.diagnosis.evidence import Evidence, relative_errors
 from rigtwin.diagnosis.fit import Fit, Values, clashes, is_possible, with_values
-from rigtwin.diagnosis.fitter import Fitter
-from rigtwin.diagnosis.gauss_newton import take_derivatives
+from rigtwin.diagnosis.fitter import PERTURBATIONS, Fitter
+from rigtwin.diagnosis.gauss_newton import SUFFICIENT_MISFIT, take_derivatives
 from rigtwin.diagnosis.overlay import Overlay, overlay
 from rigtwin.errors import RigtwinError
 from rigtwin.files import forbid_overwriting
@@ -36,6 +37,8 @@ DISTINCT = 3.0
 """Standard deviations by which two optima have to differ to count as two."""
 SHARES = (1.0, 0.3)
 """Shares of the effects' separate values from which they are fitted together."""
+LINEAR = ("coulomb", "viscous", "offset", "stiffness", "mass", "armature")
+"""Kinds of one parameter in which the forces along a given motion are linear."""
 
 
 @dataclass(frozen=True)
@@ -207,14 +210,21 @@ def fit_effects(
         raise RigtwinError(
             f"{names}: an effect lacks what it acts through, as play lacks dry friction"
         )
-    coarse = Fitter(evidence.thin().halve_steps())
-    optima = []
+    exact = Fitter(evidence)
+    thinned = evidence.thin().halve_steps()
+    # A model that integrates nothing has nothing coarser.
+    coarse = exact if thinned.models == evidence.models else Fitter(thinned)
+    optima: list[Fit] = []
     for start in _list_starts(coarse, effects, progress):
         optima.append(coarse.refine(effects, start))
         progress(1)
+        if _is_settled(coarse, optima):
+            break
+    settled = _is_settled(coarse, optima)
     optima.sort(key=lambda fit: fit.misfit)
-    exact = Fitter(evidence)
-    fit = exact.refit_with_tolerances(exact.refine(effects, optima[0].values))
+    # A settled optimum needs no further starts nearby.
+    restarts = () if settled else PERTURBATIONS
+    fit = exact.refit_with_tolerances(optima[0], restarts)
     progress(1)
     covariance = _find_covariance(exact, fit)
     parameters = _list_parameters(evidence.machine, fit, covariance)
@@ -243,7 +253,14 @@ def _errors(evidence: Evidence | None, plant: Plant) -> tuple[float, ...]:
 def _list_starts(
     fitter: Fitter, effects: tuple[Effect, ...], progress: Callable[[int], object]
 ) -> list[list[tuple[float, ...]]]:
-    """Return starts of the joint fit: shares of the separate fits, and one effect after another."""
+    """Return starts of the joint fit.
+
+    Where forces are linear in all parameters, one linear least-squares solution lies near the
+    optimum, and a second start tells whether it is the only one. Otherwise the effects are fitted
+    alone: shares of these fits, and one effect after another.
+    """
+    if all(effect.kind.name in LINEAR for effect in effects):
+        return _start_linear(fitter, effects)
     alone: dict[Effect, Fit] = {}
     for effect in effects:
         # A refinement of friction does nothing by itself: it starts at its own first size.
@@ -264,6 +281,42 @@ def _list_starts(
     if len(alone) > 1:
         starts.append(_start_in_turn(fitter, effects, alone, values))
     return starts if len(effects) > 1 else starts[:1]
+
+
+def _is_settled(fitter: Fitter, optima: Sequence[Fit]) -> bool:
+    """Return whether no further start can find another optimum of effects with linear forces.
+
+    The first fit leaves no more than noise, or all fits agree. Where the model leaves more than
+    noise, the rest counts as noise.
+    """
+    first, expected = optima[0], fitter.evidence.expected
+    if any(effect.kind.name not in LINEAR for effect in first.effects):
+        return False
+    if first.misfit < SUFFICIENT_MISFIT * expected:
+        return True
+    excess = max(first.misfit / expected, 1.0)
+    return len(optima) > 1 and all(
+        abs(rival.misfit - first.misfit) < TIED * excess
+        and np.all(np.abs(np.subtract(a, b)) <= np.sqrt(excess) * np.asarray(width))
+        for rival in optima[1:]
+        for a, b, width in zip(first.values, rival.values, first.widths, strict=True)
+    )
+
+
+def _start_linear(fitter: Fitter, effects: tuple[Effect, ...]) -> list[list[tuple[float, ...]]]:
+    """Return two starts of effects in which forces are linear.
+
+    The first is the least-squares solution of the balance of forces, or of the prediction's
+    residual where no balance can be formed: a Gauss-Newton step from there is the same solution.
+    """
+    small = [
+        fitter.scale_start(effect, fitter.starts(effect).values[0], SHARES[-1])[0]
+        for effect in effects
+    ]
+    balanced = balance_forces(fitter, effects)
+    if balanced is None:
+        return [[tuple(effect.nominal(fitter.plant).values()) for effect in effects], small]
+    return [list(balanced), small]
 
 
 def _start_in_turn(

@@ -21,7 +21,8 @@ class Controls:
         self,
         server: viser.ViserServer,
         look: Look,
-        first: Iterable[str],
+        first: Mapping[str, Iterable[float]],
+        title: str,
         changed: Callable[[], object],
     ) -> None:
         """Build the controls.
@@ -33,7 +34,9 @@ class Controls:
         look
             Look at the recording.
         first
-            Effects listed before all others.
+            Effects listed before all others, with the values of their sliders. They are not ticked.
+        title
+            Title of their folder.
         changed
             Function called when a user moves a control.
         """
@@ -47,6 +50,8 @@ class Controls:
             name: [slider.nominal if n == 0 else slider.start for n, slider in enumerate(sliders)]
             for name, sliders in look.sliders.items()
         }
+        self._values.update({name: list(values) for name, values in first.items()})
+        self._title = title
         self._knobs = {
             name: [knob_of(slider) for slider in sliders] for name, sliders in look.sliders.items()
         }
@@ -67,8 +72,8 @@ class Controls:
 
     def _folders(self, first: tuple[str, ...]) -> list[tuple[str, list[str], bool]]:
         """Return each folder's title, effects, and whether it is open."""
-        # Effects of the diagnosis come first, in an open folder.
-        folders = [("found", list(first), True)] if first else []
+        # Effects of the diagnosis or the first look come first, in an open folder.
+        folders = [(self._title, list(first), True)] if first else []
         by_component: dict[str, list[str]] = {}
         for name, effect in self._look.effects.items():
             if name not in first:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -13,10 +14,15 @@ from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Machine
 from rigtwin.diagnosis import calibrated
 from rigtwin.diagnosis.data_checks import require_fit
+from rigtwin.diagnosis.diagnose import diagnose
 from rigtwin.diagnosis.evidence import Evidence
+from rigtwin.diagnosis.first_look import FirstLook, look_first
 from rigtwin.diagnosis.fit import clashes, with_values
 from rigtwin.diagnosis.fitter import Fitter
 from rigtwin.diagnosis.known_effects import EffectFit, find_effects, fit_effects
+from rigtwin.diagnosis.prices import Prices
+from rigtwin.diagnosis.result import Diagnosis
+from rigtwin.diagnosis.thresholds import STANDARD
 from rigtwin.errors import RigtwinError
 from rigtwin.files import atomic_write, forbid_overwriting
 from rigtwin.looking.motions import find_positions, predicts_motion
@@ -67,7 +73,7 @@ class Look:
         configuration = machine.configuration_of(recording, base)
         # Faults of the data are reported before the model is built, which takes seconds.
         require_fit(machine, recording, configuration)
-        self.machine, self.recording = machine, recording
+        self.machine, self.recording, self._base = machine, recording, base
         # The same evidence as a diagnosis: its band, its weights and its noise.
         self._evidence = Evidence(machine, [recording], [configuration])
         self._fitter = Fitter(self._evidence)
@@ -87,6 +93,30 @@ class Look:
     def units(self) -> tuple[str, ...]:
         """Units of the observed signals."""
         return tuple(row.unit for row in self.machine.rows)
+
+    @cached_property
+    def first_look(self) -> FirstLook:
+        """Gap of each sensor, and the effects that may cause it; takes a second or two."""
+        return self._screening[0]
+
+    @cached_property
+    def suspects(self) -> dict[str, tuple[float, ...]]:
+        """Effects that may cause the gap, the likeliest first, at the best values tried."""
+        first, best = self._screening
+        return {str(name): best[str(name)] for name, _ in first.suspects}
+
+    @cached_property
+    def _screening(self) -> tuple[FirstLook, dict[str, tuple[float, ...]]]:
+        """First look, and the best value that was tried of each effect."""
+        coarse = Fitter(self._evidence.thin().halve_steps())
+        screened = [coarse.screen(effect) for effect in self.effects.values()]
+        # As a diagnosis of data that noise and declared error explain: before any fit, no
+        # discrepancy is known.
+        samples = 0.5 * self._evidence.expected
+        prices = Prices(coarse, STANDARD, len(screened), samples, len(self.sensors), 0.0)
+        # Prices are in nats; a chi-square is twice as large.
+        first = look_first(coarse, screened, 2.0 * prices.ordinary, STANDARD)
+        return first, {each.effect.name: each.starts[0][1] for each in screened}
 
     @property
     def predicts_motion(self) -> bool:
@@ -215,6 +245,23 @@ class Look:
             If no effect is named, one is unknown, or two set the same parameter.
         """
         return fit_effects(self._evidence, find_effects(self.machine, names))
+
+    def diagnose(
+        self, progress: Callable[[str, int], object] = lambda _stage, _steps: None
+    ) -> Diagnosis:
+        """Diagnose the recording, as `rigtwin.diagnose` does without held-out recordings.
+
+        Parameters
+        ----------
+        progress
+            Function called with the name of a stage and the number of steps since its last call.
+
+        Returns
+        -------
+        Diagnosis
+            The answer, and the corrected twin.
+        """
+        return diagnose(self.machine, [self.recording], self._base, progress=progress)
 
     def save(self, path: str | Path, values: Mapping[str, Sequence[float]]) -> Path:
         """Write the twin with effects as TOML, for `--config`.

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 
 from rigtwin.errors import RigtwinError
@@ -17,7 +18,7 @@ from rigtwin.looking.local_server import LocalServer, stop_server
 from rigtwin.looking.look import Look
 from rigtwin.looking.prediction import Prediction
 from rigtwin.looking.scene import Scene
-from rigtwin.looking.starting_point import StartingPoint
+from rigtwin.looking.starting_point import StartingPoint, from_document
 from rigtwin.looking.texts import describe_errors, describe_fit, describe_starting_point, note
 from rigtwin.looking.timeline import Timeline
 from rigtwin.numerics.arrays import Array
@@ -44,7 +45,7 @@ class Page:
     ) -> None:
         """Open the page on a server without content, which the page stops.
 
-        `start` are the effects the sliders begin with; None for the described twin.
+        `start` are the effects and suspects the sliders begin with; None for the described twin.
         """
         self._look, self.saved_to = look, saved_to
         self._server = server
@@ -73,7 +74,7 @@ class Page:
 
     def _build(self, start: StartingPoint | None) -> None:
         look, gui = self._look, self._server.gui
-        self._scene = Scene(self._server, look.machine, look.predicts_motion)
+        self._scene = Scene(self._server, look.machine, look.predicts_motion, self._measured)
         gui.main_panel.dock_right()
         self._errors = gui.add_html("")
         self._status = gui.add_html("" if start is None else describe_starting_point(start))
@@ -81,6 +82,10 @@ class Page:
             "fit what is ticked", hint="finds the values that explain the recording best"
         )
         self._fit_button.on_click(lambda _: self._ask(self._fit))
+        self._diagnose_button = gui.add_button(
+            "diagnose", hint="searches all effects, and takes into the twin what it finds"
+        )
+        self._diagnose_button.on_click(lambda _: self.diagnose())
         self._reset_button = gui.add_button("back to the described twin")
         self._reset_button.on_click(lambda _: self._ask(self._reset))
         self._save_button = gui.add_button(
@@ -88,7 +93,14 @@ class Page:
         )
         self._save_button.on_click(lambda _: self._ask(self._save))
         values = {} if start is None else start.values
-        self._controls = Controls(self._server, look, values, self._on_moved)
+        suspects = {} if start is None else start.suspects
+        self._controls = Controls(
+            self._server,
+            look,
+            {**values, **suspects},
+            "found" if values else "suspects",
+            self._on_moved,
+        )
         self._controls.set(values)
         self._timeline = Timeline(self._server, look, self._refresh)
         # A new tab may have been opened while nothing changed.
@@ -107,6 +119,10 @@ class Page:
     def add_note(self, text: str) -> None:
         """Add a remark on the recording."""
         self._status.content = note(text) + self._status.content
+
+    def diagnose(self) -> None:
+        """Request a diagnosis, as the page's button does. What it finds is taken into the twin."""
+        self._ask(self._diagnose)
 
     def wait(self) -> None:
         """Wait until the page is closed. Raise the error that stopped it, if any."""
@@ -190,35 +206,15 @@ class Page:
         self._refresh("text", "plots", "scene")
 
     def _fit(self) -> None:
-        """Fit the ticked effects, with all controls locked and the time shown."""
+        """Fit the ticked effects."""
         names = list(self._controls.values)
         if not names:
             self._status.content = note("tick what is to be fitted, or move its slider")
             return
-        begun, done = time.monotonic(), threading.Event()
-
-        def tell() -> None:
-            while not done.wait(0.5) and not self._closed:
-                seconds = time.monotonic() - begun
-                self._status.content = note(f"fitting {' and '.join(names)}: {seconds:.0f} s")
-
+        begun = time.monotonic()
         # A fit starts from the present values, which must not change meanwhile.
-        buttons = (self._fit_button, self._reset_button, self._save_button)
-        self._controls.lock(True)
-        for button in buttons:
-            button.disabled = True
-        self._status.content = note(f"fitting {' and '.join(names)}")
-        teller = threading.Thread(target=tell, daemon=True)
-        teller.start()
-        try:
+        with self._busy(f"fitting {' and '.join(names)}"):
             fitted = self._look.fit(names)
-        finally:
-            done.set()
-            teller.join()
-            if not self._closed:
-                self._controls.lock(False)
-                for button in buttons:
-                    button.disabled = False
         if self._closed:
             return
         self._controls.set(
@@ -228,6 +224,47 @@ class Page:
             }
         )
         self._status.content = describe_fit(fitted, time.monotonic() - begun)
+
+    def _diagnose(self) -> None:
+        """Diagnose the recording, and take the effects that it finds into the twin."""
+        with self._busy("diagnosing"):
+            answer = self._look.diagnose()
+        if self._closed:
+            return
+        found = from_document(answer.document(), self._look, str(self._look.recording.path))
+        self._controls.set(found.values)
+        self._status.content = describe_starting_point(found)
+
+    @contextmanager
+    def _busy(self, work: str) -> Iterator[None]:
+        """Lock all controls and show the time while something is worked out."""
+        begun, done = time.monotonic(), threading.Event()
+
+        def tell() -> None:
+            while not done.wait(0.5) and not self._closed:
+                self._status.content = note(f"{work}: {time.monotonic() - begun:.0f} s")
+
+        buttons = (
+            self._fit_button,
+            self._diagnose_button,
+            self._reset_button,
+            self._save_button,
+        )
+        self._controls.lock(True)
+        for button in buttons:
+            button.disabled = True
+        self._status.content = note(work)
+        teller = threading.Thread(target=tell, daemon=True)
+        teller.start()
+        try:
+            yield
+        finally:
+            done.set()
+            teller.join()
+            if not self._closed:
+                self._controls.lock(False)
+                for button in buttons:
+                    button.disabled = False
 
     def _reset(self) -> None:
         """Take all effects out of the twin."""

@@ -2,33 +2,64 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
 import viser
 
 from rigtwin.description.machine import Machine
-from rigtwin.looking.shapes import PosedMachine, Shape
+from rigtwin.looking.shapes import Extent, PosedMachine, Shape
 from rigtwin.numerics.arrays import Array
 
 GHOST = (235, 110, 20)
 """Colour of the twin's prediction: red, green, blue."""
 SEEN_THROUGH = 0.4
 """Opacity of the ghost."""
+FLOOR = 6.0
+"""Side of the floor, relative to the machine's radius."""
 
 
 class Scene:
-    """A machine on a page, with a ghost if the twin predicts a motion."""
+    """A machine on a page, with a ghost if the twin predicts a motion.
 
-    def __init__(self, server: viser.ViserServer, machine: Machine, ghost: bool) -> None:
+    Attributes
+    ----------
+    floor
+        Grid below the machine. None where the MJCF has a plane.
+    """
+
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        machine: Machine,
+        ghost: bool,
+        motion: Mapping[str, Array] | None = None,
+    ) -> None:
+        """Draw a machine.
+
+        Parameters
+        ----------
+        server
+            Server of the page.
+        machine
+            Machine that is drawn.
+        ghost
+            Whether the twin's prediction is drawn too.
+        motion
+            Joint → positions, in m or rad, that camera and floor are chosen for. Default: the
+            machine stands as the MJCF has it.
+        """
         self._body = PosedMachine(machine)
         self._server = server
         shapes = self._body.shapes()
-        place, centre, angle = self._body.camera()
+        extent = self._body.extent(motion or {})
+        place, centre, angle = self._body.camera(extent)
         server.initial_camera.position = place
         server.initial_camera.look_at = centre
         server.initial_camera.fov = angle
         self._machine = _add(server, "/machine", shapes)
+        self.floor = None if self._body.has_floor else _add_floor(server, extent)
         # What cannot move would only cover itself.
         moving = [shape for shape in shapes if shape.moves]
         self._ghost = _add(server, "/ghost", moving, GHOST) if ghost else {}
@@ -57,6 +88,22 @@ class Scene:
                     for joint, position in measured.items()
                 }
                 _place(self._ghost, *self._body.poses(magnified))
+
+
+def _add_floor(server: viser.ViserServer, extent: Extent) -> viser.GridHandle:
+    """Add a grid at the lowest point of a machine whose MJCF has no plane."""
+    cell = 10.0 ** math.floor(math.log10(extent.radius))
+    side = cell * math.ceil(FLOOR * extent.radius / cell)
+    middle = extent.centre
+    return server.scene.add_grid(
+        "/floor",
+        width=side,
+        height=side,
+        cell_size=0.5 * cell,
+        section_size=cell,
+        plane_opacity=0.4,
+        position=(float(middle[0]), float(middle[1]), float(extent.low[2])),
+    )
 
 
 def _add(

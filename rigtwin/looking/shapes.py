@@ -26,6 +26,10 @@ BONE = (150, 160, 175)
 """Colour of a body without a shape: red, green, blue."""
 ASPECT = 16.0 / 9.0
 """Width over height of the pictures for which the cameras of an MJCF are set."""
+ASIDE = np.array([0.7, -1.4, 0.7])
+"""Direction from which a machine without a camera is seen."""
+POSES = 25
+"""Number of poses of a motion that camera and floor are chosen for."""
 BALL = 2
 """Subdivisions of the icosahedron that approximates a ball."""
 
@@ -52,6 +56,8 @@ class Shape:
         Whether the faces are flat.
     position, turn
         Pose in the body's frame: position in m, and a quaternion.
+    is_plane
+        Whether it is the plane of a floor or wall.
     """
 
     body: int
@@ -63,6 +69,31 @@ class Shape:
     edges: bool
     position: Array
     turn: Array
+    is_plane: bool = False
+
+
+@dataclass(frozen=True)
+class Extent:
+    """Box that a machine needs during a motion.
+
+    Attributes
+    ----------
+    low, high
+        Corners, in m, shape (3,).
+    """
+
+    low: Array
+    high: Array
+
+    @property
+    def centre(self) -> Array:
+        """Middle of the box, m, shape (3,)."""
+        return 0.5 * (self.low + self.high)
+
+    @property
+    def radius(self) -> float:
+        """Radius of the ball around the box, m."""
+        return max(0.5 * float(np.linalg.norm(self.high - self.low)), 1e-6)
 
 
 class PosedMachine:
@@ -104,6 +135,7 @@ class PosedMachine:
                     edges=kind in (mujoco.mjtGeom.mjGEOM_BOX, mujoco.mjtGeom.mjGEOM_PLANE),
                     position=model.geom_pos[number].copy(),
                     turn=model.geom_quat[number].copy(),
+                    is_plane=kind == mujoco.mjtGeom.mjGEOM_PLANE,
                 )
             )
         return [*shapes, *self._bones({shape.body for shape in shapes})]
@@ -151,10 +183,47 @@ class PosedMachine:
         mujoco.mj_kinematics(self._model, self._data)
         return self._data.xpos.copy(), self._data.xquat.copy()
 
-    def camera(self) -> tuple[Array, Array, float]:
+    @property
+    def has_floor(self) -> bool:
+        """Whether the MJCF has a plane."""
+        return bool(np.any(self._model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE))
+
+    def extent(self, motion: Mapping[str, Array]) -> Extent:
+        """Return the box that the machine needs during a motion.
+
+        Parameters
+        ----------
+        motion
+            Joint → positions, in m or rad, shape (ticks,). All other joints stay where the MJCF has
+            them. `POSES` of the ticks are looked at.
+
+        Returns
+        -------
+        Extent
+            Box around all shapes but planes.
+        """
+        ticks = min((len(values) for values in motion.values()), default=1)
+        low, high = np.full(3, np.inf), np.full(3, -np.inf)
+        corners = [
+            (shape.body, _place_corners(shape)) for shape in self.shapes() if not shape.is_plane
+        ]
+        for tick in np.unique(np.linspace(0, ticks - 1, POSES).astype(int)):
+            self.poses({joint: float(values[tick]) for joint, values in motion.items()})
+            for body, points in corners:
+                turn = self._data.xmat[body].reshape(3, 3)
+                placed = points @ turn.T + self._data.xpos[body]
+                low = np.minimum(low, placed.min(axis=0))
+                high = np.maximum(high, placed.max(axis=0))
+        if not np.all(low <= high):
+            centre, size = self._model.stat.center, float(self._model.stat.extent)
+            low, high = centre - 0.5 * size, centre + 0.5 * size
+        return Extent(low, high)
+
+    def camera(self, extent: Extent) -> tuple[Array, Array, float]:
         """Return the camera's position and target, in m, and its vertical field of view, in rad.
 
-        The first camera of the MJCF is used; without one, a view from the side and above.
+        The first camera of the MJCF is used. Without one, the view is from the side and above, and
+        as far off as shows the whole extent.
         """
         mujoco.mj_kinematics(self._model, self._data)
         mujoco.mj_comPos(self._model, self._data)
@@ -168,8 +237,21 @@ class PosedMachine:
             # The camera turns about the point nearest to the machine's centre on its line of sight.
             ahead = max(float(forward @ (centre - place)), 0.1 * float(statistic.extent))
             return place, place + ahead * forward, _widen(self._model.cam_fovy[0])
-        aside = statistic.extent * np.array([0.7, -1.4, 0.7])
-        return centre + aside, centre, _widen(self._model.vis.global_.fovy)
+        angle = _widen(self._model.vis.global_.fovy)
+        # A square picture shows the least of it where a panel covers either side: the angle of a
+        # wide picture's height counts.
+        distance = extent.radius / math.sin(0.5 * math.radians(self._model.vis.global_.fovy))
+        middle = extent.centre
+        return middle + distance * ASIDE / np.linalg.norm(ASIDE), middle, angle
+
+
+def _place_corners(shape: Shape) -> Array:
+    """Return the corners of the box around a shape, in its body's frame, in m, shape (8, 3)."""
+    low, high = shape.vertices.min(axis=0), shape.vertices.max(axis=0)
+    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
+    turn = np.empty(9)
+    mujoco.mju_quat2Mat(turn, shape.turn)
+    return (low + corners * (high - low)) @ turn.reshape(3, 3).T + shape.position
 
 
 def _widen(angle: float) -> float:

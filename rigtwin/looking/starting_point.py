@@ -1,10 +1,10 @@
-"""Starting point of a look: the effects that a diagnosis or an alarm found."""
+"""Starting point of a look: what the first look suspects, or a diagnosis or an alarm found."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -28,12 +28,31 @@ class StartingPoint:
         Names of effects that no slider moves, such as a setting.
     confidence
         Confidence of each effect, by name.
+    suspects
+        Effects that are listed first but are not in the twin, with the values of their sliders.
     """
 
     sentence: str
     values: Mapping[str, tuple[float, ...]]
-    without_slider: tuple[str, ...]
-    confidence: Mapping[str, float]
+    without_slider: tuple[str, ...] = ()
+    confidence: Mapping[str, float] = field(default_factory=dict)
+    suspects: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+
+
+def from_first_look(look: Look) -> StartingPoint:
+    """Return the suspects of the first look as a starting point.
+
+    Parameters
+    ----------
+    look
+        Look at a recording.
+
+    Returns
+    -------
+    StartingPoint
+        Suspects with the best values that were tried, and no effect in the twin.
+    """
+    return StartingPoint(f"first look: {look.first_look}", {}, suspects=look.suspects)
 
 
 def from_alarm(alarm: Alarm, look: Look) -> StartingPoint:
@@ -91,6 +110,31 @@ def read_diagnosis(path: str | Path, look: Look) -> StartingPoint:
         raise RigtwinError(f"cannot read {path}: {error.strerror}") from None
     except (ValueError, RecursionError):
         raise RigtwinError(f"{path}: expected the JSON of rigtwin diagnose --json") from None
+    return from_document(document, look, str(path))
+
+
+def from_document(document: Mapping[str, Any], look: Look, path: str) -> StartingPoint:
+    """Return the JSON document of a diagnosis as a starting point.
+
+    Parameters
+    ----------
+    document
+        JSON document, see `Diagnosis.document`.
+    look
+        Look at one of the diagnosed recordings.
+    path
+        Path of the document, for messages.
+
+    Returns
+    -------
+    StartingPoint
+        Effects of the diagnosis.
+
+    Raises
+    ------
+    RigtwinError
+        If it is no diagnosis, or belongs to other recordings or to another machine.
+    """
     try:
         machine, recordings = str(document["machine"]), [str(r) for r in document["recordings"]]
         sentence = str(document["sentence"])

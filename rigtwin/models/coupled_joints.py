@@ -58,6 +58,7 @@ class CoupledJoints:
         steps: int,
         every: int = 1,
         quick: bool = False,
+        start: InitialState | None = None,
     ) -> None:
         """Prepare the model.
 
@@ -69,6 +70,9 @@ class CoupledJoints:
             Ticks of the recording for each tick of `inputs`.
         quick
             Whether errors of the start are linear nuisance parameters instead of being fitted.
+        start
+            Judged initial state of the same recording at the same ticks. Default: it is judged,
+            which takes as many predictions as there are free positions and velocities.
 
         Raises
         ------
@@ -107,7 +111,10 @@ class CoupledJoints:
         self._changed: Memo[Multibody] = Memo(KEPT)
         self._last: Memo[Array] = Memo(KEPT)
         self._starts: Memo[Array] = Memo(KEPT)
-        self._judge_start()
+        if start is None:
+            self._judge_start()
+        else:
+            self._start = start
 
     def _read_motions(self, inputs: Inputs) -> None:
         """Smooth the prescribed motions and collect the sensors that show the initial state."""

@@ -49,6 +49,8 @@ class ForwardDynamicsModel(CoupledJoints, Model[Plant]):
             steps,
             self.every,
             self._quick,
+            # How well the start is known hardly depends on the integration steps.
+            self._start,
         )
 
     def thin(self, longest: float) -> ForwardDynamicsModel:

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from rigtwin.numerics.arrays import Array
 
@@ -297,9 +298,16 @@ def wiener_gain(frequencies: Array, density: Array, noise: float) -> Array:
     nine lines, exceeds the noise's density.
     """
     smooth = np.empty_like(density)
-    for line in range(len(density)):
-        half = max(4, line // 10)
-        smooth[line] = np.mean(density[max(0, line - half) : line + half + 1])
+    count = len(density)
+    for first in range(0, count, 10):
+        # Ten lines share one width; away from both ends they are averaged at once.
+        half, end = max(4, first // 10), min(first + 10, count)
+        low, high = max(first, half), min(end, count - half)
+        if low < high:
+            windows = sliding_window_view(density[low - half : high + half], 2 * half + 1)
+            smooth[low:high] = np.mean(windows, axis=1)
+        for line in (*range(first, min(low, end)), *range(max(low, high), end)):
+            smooth[line] = np.mean(density[max(0, line - half) : line + half + 1])
     stands_out = (smooth > STANDS_OUT * noise) & (frequencies < HIGHEST_MOTION)
     if not stands_out.any():
         return np.zeros_like(density)

@@ -6,13 +6,17 @@ from collections.abc import Mapping
 from typing import Protocol
 
 import numpy as np
-from dm_env import specs
 
 from controllers import Commands, Controller, Demand, Measurements, MilState, Settings, update
 from controllers.quantity import Quantity, fields
 from rigtwin.description.configuration import Configuration
 from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
+
+try:
+    from dm_env import specs
+except ModuleNotFoundError:
+    raise RigtwinError("environments need dm-env: pip install 'rigtwin[learning]'") from None
 
 
 class Actions(Protocol):

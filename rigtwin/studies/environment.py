@@ -26,9 +26,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, NamedTuple
 
-import dm_env
 import numpy as np
-from dm_env import specs
 
 from controllers import Commands, Demand, Measurements, initial_state
 from rigtwin.components.tyre import tyre_force
@@ -39,6 +37,12 @@ from rigtwin.numerics.arrays import Array
 from rigtwin.simulation.safety import Trip, empty_memory, judge_limits
 from rigtwin.simulation.twin import Twin
 from rigtwin.studies.actions import Actions, suspension
+
+try:
+    import dm_env
+    from dm_env import specs
+except ModuleNotFoundError:
+    raise RigtwinError("environments need dm-env: pip install 'rigtwin[learning]'") from None
 
 if TYPE_CHECKING:
     from dm_control.mujoco import Physics
