@@ -175,11 +175,13 @@ def load(path: Path) -> Recording:
     content = FileContent()
     try:
         with path.open("rb") as file:
+            # An empty file gets a message of its own; the MCAP reader would call it damaged.
             if not file.read(1):
                 raise RigtwinError(f"{path} is empty; expected an MCAP recording")
             file.seek(0)
             for record in read_records(file):
                 content.add(record)
+    # mcap unpacks whatever a read returns, so a file that ends early raises struct.error.
     except (InvalidMagic, struct.error):
         raise RigtwinError(f"{path} is not an MCAP file") from None
     except OSError as error:
@@ -231,6 +233,7 @@ class FileContent:
             values, whole = unseal(record.metadata)
             if not whole:
                 self._doubtful.append(record.name)
+            # The last record of a name counts: a writer can add to a file, but not change it.
             self._metadata[record.name] = values
             # A full disk makes the writer repeat a transition, so duplicates are dropped.
             if record.name == TRANSITION_RECORD and values not in self._states:
@@ -374,6 +377,7 @@ def transitions(path: Path) -> tuple[Mapping[str, str], ...]:
     RigtwinError
         If the file cannot be read at all.
     """
+    # Only metadata are needed, so messages are not decoded and a file without ticks is no error.
     states: list[Mapping[str, str]] = []
     try:
         with path.open("rb") as file:
@@ -383,6 +387,7 @@ def transitions(path: Path) -> tuple[Mapping[str, str], ...]:
                     states += [values] if values not in states else []
     except OSError as error:
         raise RigtwinError(f"cannot read {path}: {error.strerror}") from None
+    # A file that is no recording has no transitions; `load` is what complains about it.
     except (InvalidMagic, struct.error):
         pass
     return _sort(states)
@@ -390,6 +395,7 @@ def transitions(path: Path) -> tuple[Mapping[str, str], ...]:
 
 def _sort(transitions: list[Mapping[str, str]]) -> tuple[Mapping[str, str], ...]:
     """Return transitions by time; on a full disk the last are in space reserved at the start."""
+    # Sorting is stable: transitions at one time keep the order in which they were written.
     return tuple(sorted(map(_printable, transitions), key=_moment))
 
 
@@ -402,6 +408,7 @@ def _moment(transition: Mapping[str, str]) -> float:
     """Return the time of a transition in s; infinite if it cannot be read."""
     try:
         return float(transition.get("time", ""))
+    # At the end: a time that cannot be read must not move the known transitions.
     except ValueError:
         return math.inf
 
@@ -461,12 +468,15 @@ def _align(
     # Nearly always all topics have the same ascending times, and nothing needs to be sorted.
     if (np.diff(first) > 0).all() and all(np.array_equal(first, times) for times in rest):
         return first * 1e-9, {topic: dict(values) for topic, (_, values) in tables.items()}
+    # np.unique also sorts, and drops repeated times, of which the first message counts.
     common = np.unique(first)
     for times in rest:
         common = np.intersect1d(common, times)
     columns: dict[str, dict[str, Array]] = {}
     for topic, (times, values) in tables.items():
         _, first = np.unique(times, return_index=True)
+        # `first` are places of sorted unique times, so `keep` is in order of time, not of the
+        # file.
         keep = first[np.isin(times[first], common)]
         if len(keep) < len(times):
             notes.append(
@@ -495,6 +505,7 @@ def _check_times(path: Path, time: Array, period: float, notes: list[str]) -> No
             f"messages come every {spacing:.6g} s, {100.0 * off:.2g} % off the period of "
             f"{period:g} s, which is what ticks are taken for"
         )
+    # Half a period separates jitter of the stamps from a tick that is missing.
     gaps = np.nonzero(np.abs(np.diff(time) - period) > 0.5 * period)[0]
     if len(gaps):
         notes.append(

@@ -93,6 +93,8 @@ def set_zeros(
     ChannelTable
         Table with new offsets.
     """
+    # Value = factor · volts + offset: a reading that is wrong by the same amount everywhere is
+    # corrected in the offset alone, whatever the span.
     lines = [
         _rescale(line, offset=line.scaling.offset - signal.mean + references.get(line.name, 0.0))
         for line, signal in zip(table.inputs, still, strict=True)
@@ -262,6 +264,8 @@ def correct_signs(
                 f"sign of {sensor}: it hardly answers (gain {gain:.2g} ± {error:.1g}); "
                 "is it connected, has the rig pressure?"
             )
+        # The travel is no output of its own: it follows the structure, so the operator judged
+        # that motion.
         driven = "structure" if output == "travel" else output
         went = moved[driven]
         if output in outputs:

@@ -37,10 +37,12 @@ class CardFault(RigtwinError):
 @contextmanager
 def translate_errors(doing: str) -> Iterator[None]:
     """Raise errors of nidaqmx as a CardFault with a message of one line."""
+    # Imported here, like everywhere below: the package is optional, and only a card needs it.
     from nidaqmx.errors import DaqNotFoundError, DaqNotSupportedError, Error, RpcError
 
     try:
         yield
+    # All errors of nidaqmx are subclasses of Error, so the special ones come first.
     except (DaqNotFoundError, DaqNotSupportedError):
         raise CardFault(f"the NI-DAQmx driver is missing on this computer; {DRIVER}") from None
     except RpcError as error:
@@ -234,6 +236,7 @@ class Card:
             self.missed, self.late = self._pacer.wait(), self._pacer.late
         try:
             self._reader.read_one_sample(self._volts, TIMEOUT)  # type: ignore[arg-type]
+            # A paced card has no buffer: each read converts at the moment of the call.
             if self._pacer is None:
                 self._drop_old_samples()
         except Exception as error:
@@ -251,6 +254,7 @@ class Card:
         if self._start < 0.0:
             self._start = now
         self.late = now - (self._start + self._count * self._period)
+        # Less than half a period is jitter of the two clocks, not a sample that waits.
         if self.late > 0.5 * self._period:
             # Samples count as missed only if the card has them: the computer's clock may be off.
             self.missed = self._stream.avail_samp_per_chan
@@ -296,6 +300,8 @@ class Card:
         """
         # Without all three tasks the card was never started, and has nothing to stop.
         if len(self._tasks) == 3:
+            # Zero force is the voltage that the table's offset assigns to it, which need not be 0
+            # V.
             zeros = self._to_volts([0.0] * len(self._outputs))
             for place in self._signals.released_places:
                 self._asked[place] = zeros[place]

@@ -63,6 +63,8 @@ class FailsafeOutputs:
         self._values[:] = outputs
         to_volts(self._conversion, self._values, self._volts)
         with translate_errors(f"card {self._table.device}: stopping it"):
+            # A driver on this computer frees the owner's lines at its death, so only now can they
+            # be reserved.
             if self._outputs is None:
                 self._take()
             assert self._outputs is not None
@@ -95,6 +97,8 @@ class FailsafeOutputs:
             SessionInitializationBehavior.ATTACH_TO_SERVER_SESSION,
         )
         assert channel is not None
+        # The writers take the first two by their place. The inputs are attached so that `close`
+        # also ends the owner's acquisition.
         for name in (OUTPUTS, PRESSURE, INPUTS):
             options = GrpcSessionOptions(channel, name, initialization_behavior=attach)
             self._tasks.append(Task(name, grpc_options=options))

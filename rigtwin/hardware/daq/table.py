@@ -153,6 +153,7 @@ class ChannelTable:
 
     def tighten(self, safety: Safety) -> Safety:
         """Return the limits, tightened by the table's limits on plausibility."""
+        # The fields of Plausible have the names of the limits in Safety that they tighten.
         return safety._replace(
             **{
                 name: min(value, getattr(safety, name))
@@ -410,6 +411,7 @@ def list_doubts(table: ChannelTable, today: date) -> list[str]:
 
 def require_trust(table: ChannelTable, today: date) -> None:
     """Raise RigtwinError unless the table may move a real machine (see `list_doubts`)."""
+    # The first doubt alone is raised, because an error is one line.
     for doubt in list_doubts(table, today):
         raise RigtwinError(doubt)
 

@@ -119,6 +119,7 @@ def _try_once(fault: InjectedFault, test: Test, folder: Path) -> FaultResult:
         # One more tick logs the outputs that the guardian has set.
         virtual.run_until(virtual.tick + 1)
     finally:
+        # SIGKILL, since a frozen process would not act on SIGTERM before it is continued.
         controller.kill()
         controller.join()
         server.stop(0.0).wait()

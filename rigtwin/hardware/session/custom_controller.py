@@ -54,6 +54,7 @@ def custom_controller(make: ControllerFactory) -> CustomController:
     # The digest covers the whole module, since a controller depends on what stands beside it.
     try:
         source = inspect.getsource(inspect.getmodule(make) or make)
+    # Controllers from a prompt or a C extension have no source; their name has to do.
     except (OSError, TypeError):
         source = name
     return CustomController(make, f"{name} {hashlib.sha256(source.encode()).hexdigest()[:16]}")

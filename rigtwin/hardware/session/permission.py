@@ -59,6 +59,7 @@ def require_permission(test: AnyTest, card: Path, without_dry_run: str | None) -
     if test.effects:
         raise RigtwinError("--effect is the twin's; the rig has its own")
     require_trust(test.table, date.today())
+    # Built only to be checked: it raises an error if a limit exceeds what a line can carry.
     test.operation()
     test.require_limits()
     opened = open_card(test)
