@@ -60,6 +60,7 @@ class ColumnBuilder:
     def end_block(self) -> None:
         """Turn the gathered cells into numbers, if they are plain numbers."""
         block: Array | list[str] = self.cells
+        # NumPy reads "1_000" as 1000, as Python does; a logger does not mean that.
         if self.decimal == "." and not any("_" in cell for cell in self.cells):
             try:
                 block = np.array(self.cells, float)
@@ -79,6 +80,7 @@ class ColumnBuilder:
             return Numbers(np.concatenate(plain))
         cells: list[str] = []
         for block in blocks:
+            # repr gives the shortest text that reads back as the same double.
             cells += block if isinstance(block, list) else map(repr, block.tolist())
         values, row = numbers_of(cells, self.decimal)
         if row is not None:
@@ -158,6 +160,8 @@ def gather_rows(
     def add(number: int, cells: list[str]) -> None:
         rows.numbers.append(number)
         for place, builder in builders:
+            # Missing cells become empty ones, which are read as NaN, so that all columns keep one
+            # length.
             builder.cells.append(cells[place].strip() if place < len(cells) else "")
         if len(rows.numbers) % BLOCK == 0:
             for _, builder in builders:
@@ -168,9 +172,11 @@ def gather_rows(
         cells = raw_cells(line, separator)
         if not line.strip(blank) or not any(map(str.strip, cells)):
             continue
+        # Many programs end each line with a separator, which makes an empty last cell.
         while len(cells) > wide and not cells[-1].strip():
             cells.pop()
         if len(cells) > wide:
+            # A number too many shifts all columns; a remark behind the last column harms nothing.
             if any(is_value(cell.strip(), decimal) for cell in cells[wide:]):
                 raise RigtwinError(f"{path}: line {number} has {len(cells)} cells; expected {wide}")
             long.append(number)
@@ -201,6 +207,7 @@ def raw_cells(line: str, separator: str) -> list[str]:
         return line.split()
     if '"' not in line:
         return line.split(separator) if line else []
+    # The csv module is much slower than split, and only quotes need it.
     try:
         return next(csv.reader(io.StringIO(line), delimiter=separator), [])
     except csv.Error as error:

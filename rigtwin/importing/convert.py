@@ -114,6 +114,7 @@ def convert(
     RigtwinError
         Before anything is written. Also if the data hold several episodes.
     """
+    # The output is checked before anything is read, which may take minutes.
     recordable(forbid_overwriting(out, *_files(data, mapping)))
     wanted = load(mapping)
     imported = read_channels(data, wanted)
@@ -150,6 +151,7 @@ def convert_episodes(
     label, columns = _label(data), read_columns(data, wanted.selection)
     episodes = _split(label, columns, wanted)
     _make_folder(folder)
+    # Data without episodes are one test, which gets the name of its file.
     if not episodes:
         out = folder / f"{data[0].stem if _are_paths(data) else 'recording'}{ENDING}"
         return (Written(out, tuple(convert(data, mapping, out, machine))),)
@@ -158,6 +160,7 @@ def convert_episodes(
     for episode in episodes:
         out = folder / f"{episode.name}{ENDING}"
         try:
+            # One damaged episode must not lose the others.
             imported = _channels(label, episode.columns, wanted)
             line = _write(recordable(out), wanted, described, imported)
         except RigtwinError as error:
@@ -188,6 +191,7 @@ def read_columns(data: Data, selection: Selection = EVERYTHING) -> Columns:
     """
     if not _are_paths(data):
         return read_frame(data, selection)
+    # A column is called `stem.name`, so equal stems would make columns ambiguous.
     if len({path.stem for path in data}) < len(data):
         raise RigtwinError("two of the files have the same name; rename one of them")
     return join({path.stem: read(path, selection.of_file(path.stem)) for path in data})
@@ -291,6 +295,8 @@ def _channels(label: str, columns: Columns, wanted: Map) -> Imported:
         report += _notes(columns, inputs)
         report += _time_notes(columns, wanted)
         time = _time(columns, wanted, signals)
+        # Order matters: repeats and the stretch are settled before the period is, since rows
+        # outside the stretch may be irregular; numbers are required only within it.
         time, signals = drop_repeats(time, signals, report)
         taken = (time - time[0] >= wanted.start) & (time - time[0] <= wanted.until)
         if taken.sum() < 2:
@@ -299,6 +305,7 @@ def _channels(label: str, columns: Columns, wanted: Map) -> Imported:
             )
         time, signals = time[taken], {name: values[taken] for name, values in signals.items()}
         period = wanted.period or find_period(time)
+        # A stated period needs no check of the time column's unit.
         if wanted.period is None:
             require_plausible(period, not _times_without_unit(columns, wanted))
         _require_numbers(columns, inputs, time, signals)
@@ -323,6 +330,7 @@ def _named(columns: Columns, name: str) -> str:
     if name in columns.values or name in columns.refused:
         return name
     bare, unit = split_unit(name, "")
+    # A name with another unit than the file's is another name, so that it is refused.
     return bare if columns.units.get(bare) == unit != "" else name
 
 
@@ -370,6 +378,7 @@ def _notes(columns: Columns, inputs: Mapping[str, Column]) -> list[str]:
                 f"taken as {asked.unit}"
             )
         wrap = looks_wrapped(columns.values[asked.name]) if asked.wrap is None else None
+        # A counter that wraps is only suspected here: a true signal may jump as far.
         if wrap is not None:
             notes.append(
                 f"{name}: column {asked.name!r} steps from one end of {wrap:.0f} counts to the "
@@ -419,6 +428,7 @@ def _time(columns: Columns, wanted: Map, signals: Signals) -> Array:
         if not np.isfinite(values).all():
             where = columns.wrong.get(name) or f"row {int(np.argmax(~np.isfinite(values))) + 1}"
             raise RigtwinError(f"time column {name!r} is not a number in {where}")
+        # A date and a time of day in two columns add up to one time.
         total = total + factor * values
     return total
 
@@ -443,11 +453,13 @@ def _values(name: str, source: Source, signals: Signals, time: Array, period: fl
     """Return the values of a channel, shape (ticks,)."""
     if source.constant is not None:
         return np.full(len(time), source.constant)
+    # An overflow gives infinity, which is refused below with the time at which it occurs.
     with np.errstate(over="ignore"):
         if source.formula is None:
             values = source.sign * source.scale * signals[name] + source.offset
         else:
             values = evaluate(source.formula, signals, period)
+    # Negated, so that NaN is refused as well.
     if (beyond := ~(np.abs(values) < LARGEST)).any():
         when = time[int(np.argmax(beyond))] - time[0]
         text = f" = {source.formula.text}" if source.formula is not None else ""
@@ -466,6 +478,7 @@ def _write(out: Path, wanted: Map, machine: Machine | None, imported: Imported) 
         fields.setdefault(topic, []).append(field)
     name = wanted.machine if machine is None else machine.name
     with (
+        # The recording appears under its name only when it is complete.
         atomic_path(out) as beside,
         Writer(
             beside,
@@ -477,6 +490,7 @@ def _write(out: Path, wanted: Map, machine: Machine | None, imported: Imported) 
             None if machine is None else catalogue.own_description(machine),
         ) as writer,
     ):
+        # Block by block: the messages of a long recording would otherwise be in memory at once.
         for start in range(0, ticks, BLOCK):
             part = slice(start, min(start + BLOCK, ticks))
             blocks = {

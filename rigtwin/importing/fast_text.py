@@ -69,6 +69,8 @@ def read_plain(
     try:
         with open_bytes(path) as file:
             for line in head:
+                # The head was split as text. Where bytes split otherwise, such as at a lone
+                # carriage return, Arrow would begin in the wrong line.
                 if file.readline().decode(encoding, "replace").rstrip("\r\n") != line:
                     return None
             reader = csv.open_csv(
@@ -100,6 +102,7 @@ def read_plain(
                     parts[name].append(np.where(np.isinf(column), np.nan, column))
     except pyarrow.ArrowException:
         return None
+    # The handler may have been called in the last block.
     if odd or not parts[names[0]]:
         return None
     # Popped, so that the parts of one column at a time are in memory twice.

@@ -204,6 +204,7 @@ def _require_keys(where: str, table: object, known: tuple[str, ...]) -> Mapping[
 
 
 def _number(where: str, value: object, low: float = -math.inf, high: float = math.inf) -> float:
+    # A boolean is an int in Python, and an integer of TOML may be too large for a float.
     number = math.nan
     if isinstance(value, int | float) and not isinstance(value, bool):
         with suppress(OverflowError):
@@ -228,6 +229,7 @@ def _map(document: Mapping[str, Any]) -> Map:
         document.get("time", {}),
         ("column", "unit", "period", "resample", "start", "until"),
     )
+    # Exactly one of them: with both, the period could contradict the stamps.
     if ("column" in time) == ("period" in time):
         raise RigtwinError('[time]: expected either column = "NAME" or period = SECONDS')
     period = _number("[time] period", time["period"], 1e-6, 10.0) if "period" in time else None
@@ -248,6 +250,7 @@ def _map(document: Mapping[str, Any]) -> Map:
         name: _number(f"[constants] {name}", each)
         for name, each in _tables(document, "constants").items()
     }
+    # Formulas know columns and constants by one name each.
     if twice := sorted(set(columns) & set(constants)):
         raise RigtwinError(f"[constants] {twice[0]}: [columns] has that name too")
     for topic in TOPICS:
@@ -282,6 +285,7 @@ def _episodes(entry: object) -> tuple[str | None, tuple[int, ...]]:
     if column is not None and not (isinstance(column, str) and column):
         raise RigtwinError(f"[episodes] column = {column}: expected the name of a column")
     take = table.get("take", [])
+    # type() rather than isinstance: true is an int in Python.
     if not isinstance(take, list | tuple) or not all(type(number) is int for number in take):
         raise RigtwinError(f"[episodes] take = {take}: expected a list of whole numbers")
     return column, tuple(dict.fromkeys(take))
@@ -358,6 +362,7 @@ def _source(name: str, entry: object, constants: Mapping[str, float]) -> Source:
     if sign not in (1, -1):
         raise RigtwinError(f"{where} sign = {sign}: expected 1 or -1")
     scale = _number(f"{where} scale", table.get("scale", 1.0))
+    # A scale of 0 would turn a column into a constant without saying so.
     if scale == 0.0:
         raise RigtwinError(f"{where} scale = 0: expected anything else")
     return Source(

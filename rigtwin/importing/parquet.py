@@ -55,6 +55,7 @@ def read_tables(
 
     tables = [_read(path, needed) for path in paths]
     try:
+        # Permissive: a column may be an integer in one file and a float in another.
         table = pyarrow.concat_tables(tables, promote_options="permissive")
     except pyarrow.ArrowException as error:
         raise RigtwinError(
@@ -96,6 +97,7 @@ def _read(path: Path, names: Sequence[str]) -> pyarrow.Table:
     if missing := [name for name in names if name not in file.schema_arrow.names]:
         raise RigtwinError(f"{path} lacks the column {missing[0]!r} of the other files")
     try:
+        # pandas metadata would add index columns that nobody asked for.
         return file.read(columns=list(names), use_pandas_metadata=False)
     except (pyarrow.ArrowException, OSError) as error:
         raise RigtwinError(f"{path} is damaged: {_first_line(error)}") from None

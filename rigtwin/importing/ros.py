@@ -87,6 +87,7 @@ def _read(path: Path, reader: Reader, selection: Selection) -> Columns:
     for name, connections in by_topic.items():
         types = {connection.msgtype for connection in connections}
         decode = find(connections[0].msgtype)
+        # Topics that cannot be read are an error only if somebody asks for them.
         if decode is None or len(types) > 1:
             why = f"topic {name} has messages of several types: {', '.join(sorted(types))}"
             if decode is None:
@@ -120,6 +121,8 @@ def _join(
     base = _times(leader)
     offset = leader.delay or 0
     values: dict[str, Array] = {}
+    # The delay is recording time minus header stamp: a difference of two topics' delays is the
+    # difference of their clocks, apart from transport.
     for topic in topics:
         shift = (topic.delay or 0) - offset
         if abs(shift) > ONE_CLOCK:
@@ -141,6 +144,7 @@ def _join(
     values = {name: column for name, column in values.items() if name not in refused}
     if not values:
         return Columns({}, refused=refused)
+    # Rows where all signals exist: the test begins with the last topic, and ends with the first.
     known = np.all([np.isfinite(column) for column in values.values()], axis=0)
     if not known.any():
         raise RigtwinError(
@@ -172,6 +176,7 @@ def _leader(topics: Sequence[Topic], selection: Selection) -> Topic:
         for topic in topics:
             if column.rpartition(".")[0] == topic.name:
                 return topic
+    # Joint states are the natural rows of a robot; otherwise the fastest topic.
     return max(topics, key=lambda topic: (topic.type == JOINT_STATE, len(topic.times)))
 
 

@@ -93,6 +93,7 @@ def read_topic(
         The needed columns.
     """
     topic = Topic(connections[0].topic, connections[0].msgtype)
+    # What is measured changes between samples; what is commanded changes only with them.
     join = Join.INTERPOLATE if topic.type.startswith(MEASURED) else Join.HOLD
     plans = topic.type == TRAJECTORY
     delays: list[int] = []
@@ -103,6 +104,7 @@ def read_topic(
         if stamp is not None:
             delays.append(recorded - stamp)
         begin = recorded if stamp is None or by_recorder else stamp
+        # Messages may overtake each other on the way; series are sorted before use.
         topic.unordered += begin < latest
         latest = begin
         topic.times.append(begin)
@@ -121,6 +123,7 @@ def read_topic(
                     series.join = Join.PLAN if len(message.points) > 1 else series.join
                 series.add(begin + after, number)
     if delays and not by_recorder:
+        # The median is robust against messages that waited; median_low stays an integer of ns.
         topic.delay = median_low(delays)
     return topic
 
@@ -152,6 +155,7 @@ def decoder(connections: Sequence[Connection]) -> Callable[[str], Decode | None]
     for connection in connections:
         if connection.msgdef.format == MessageDefinitionFormat.MSG:
             types = get_types_from_msg(connection.msgdef.data, connection.msgtype)
+            # Several connections bring the definition of one type; the first is kept.
             embedded.register({k: v for k, v in types.items() if k not in embedded.fielddefs})
 
     def find(kind: str) -> Decode | None:

@@ -30,6 +30,7 @@ class Selection:
     def __post_init__(self) -> None:
         # A map may name a column as the file's first line does, with the unit behind the name.
         names = self.names or ()
+        # The dataclass is frozen, and this field derives from the others.
         object.__setattr__(self, "_bare", frozenset(split_unit(name, "")[0] for name in names))
 
     def takes(self, name: str) -> bool:

@@ -56,6 +56,7 @@ def find_period(time: Array) -> float:
     typical = float(np.median(steps))
     regular = np.abs(steps - typical) < JITTER * typical
     period = float(np.mean(steps[regular]))
+    # The stamps allow a rounding that moves the last of them by less than the jitter.
     for digits in range(1, 8):
         rounded = float(f"{period:.{digits}g}")
         if (
@@ -114,6 +115,7 @@ def require_even_ticks(time: Array, period: float, report: list[str]) -> None:
             f"or say [time] resample = {period:g}"
         )
     drift = abs((time[-1] - time[0]) / (len(time) - 1) - period)
+    # The drift over the whole test counts, not that of one period.
     if drift * len(time) > JITTER * period:
         report.append(
             f"time stamps drift: on average every {(time[-1] - time[0]) / (len(time) - 1):.6g} s, "
@@ -144,6 +146,8 @@ def resample(
     ticks = np.arange(int((time[-1] - time[0]) / wanted + 1e-6) + 1) * wanted + time[0]
     resampled = {}
     for name, values in signals.items():
+        # Without delay, by filtering both ways: channels must stay in phase with each other. A
+        # short signal has not enough samples for the filter to settle.
         if wanted > 1.5 * period and len(values) > 60:
             values = sosfiltfilt(butter(4, 0.8 * period / wanted, output="sos"), values)
         resampled[name] = np.interp(ticks, time, values)

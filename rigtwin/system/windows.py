@@ -44,6 +44,7 @@ RESOLUTION = time.get_clock_info("perf_counter").resolution
 def _library(name: str) -> Any:
     """Return a system library that passes 64-bit handles unchanged."""
     library = getattr(ctypes, "WinDLL")(name, use_last_error=True)  # noqa: B009 - of Windows alone
+    # By default ctypes takes results for 32-bit integers, and would cut off a handle.
     for call in ("GetCurrentProcess", "GetCurrentThread", "OpenProcess"):
         if name == "kernel32":
             getattr(library, call).restype = ctypes.c_void_p
@@ -67,6 +68,7 @@ def lock_file(handle: int) -> None:
     """
     msvcrt = import_module("msvcrt")
     os.lseek(handle, 1 << 30, os.SEEK_SET)
+    # _locking starts at the file position, which is therefore set beyond the end and reset.
     try:
         msvcrt.locking(handle, msvcrt.LK_NBLCK, 1)
     finally:
