@@ -151,6 +151,7 @@ class LivePage:
             if ended:
                 self._page.add_note(ended)
         except BaseException as error:  # handed to the thread that waits for the page
+            # After closing, errors are expected: the server that they come from is gone.
             if not self._closed:
                 self._failure = error
         finally:

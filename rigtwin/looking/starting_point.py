@@ -111,6 +111,7 @@ def read_diagnosis(path: str | Path, look: Look) -> StartingPoint:
         )
     possible = {effect.name for effect in look.machine.effects()}
     for effect, _, _ in findings:
+        # Findings on the controller's settings are no effects of the machine, but valid.
         if effect not in possible and not effect.endswith("@controller"):
             raise RigtwinError(f"{path}: {machine} can have no {effect}")
     values = {

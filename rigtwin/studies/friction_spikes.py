@@ -253,6 +253,7 @@ def reversals(recording: Recording) -> tuple[NDArray[np.intp], Array, NDArray[np
     )
     crossings = np.flatnonzero(np.diff(np.sign(velocity)) != 0)
     gap = SEPARATION / recording.period
+    # Prepending and appending a full gap lets the first and the last crossing count as isolated.
     behind = np.diff(crossings, prepend=-gap) >= gap
     alone = behind & (np.diff(crossings, append=recording.ticks + gap) >= gap)
     isolated = crossings[alone]
@@ -300,9 +301,12 @@ def find_compensator(recording: Recording, settings: Settings, seed: int = 0) ->
     cell = recording.column("/sensor", "load_cell")
     errors = recording.column("/command", "force") - filter_lag(cell, settings.filter_force, period)
     # Before a reversal the error is the steady tracking error; friction causes the rise above it.
+    # The last quarter of the window is left out, because the tick of the jump is only known
+    # roughly.
     steady = directions * np.array(
         [np.mean(errors[tick - window : tick - window // 4]) for tick in ticks],
     )
+    # The sign makes all reversals look alike: the error then rises.
     pairs = zip(ticks, directions, strict=True)
     rises = np.array([way * errors[tick : tick + 2 * window] for tick, way in pairs])
     envelope = np.mean(rises - steady[:, None], axis=0)
@@ -311,6 +315,8 @@ def find_compensator(recording: Recording, settings: Settings, seed: int = 0) ->
     base = settings._replace(compensator=Compensator.ONE_STEP, friction_step=2 * coulomb)
     travels = recording.column("/sensor", "suspension_lvdt")
     test = _Test(travels, np.zeros(recording.ticks), friction, period)
+    # `due` is the error that friction causes through the known loop; the measured error less that
+    # part belongs to all other causes, and is assumed to be unchanged by compensation.
     due, steps = np.empty(recording.ticks), np.empty(recording.ticks)
     _close_loop(base, False, test, due, steps)
     test = test._replace(rest=errors - due)
@@ -385,6 +391,7 @@ def _measure_jumps(
     # force before and after is largest.
     pairs = zip(turns, directions, strict=True)
     jumps = [_jump(friction, tick, way, window) for tick, way in pairs]
+    # The median is robust against reversals that were located wrongly.
     coulomb = 0.5 * float(np.median([size for _, size in jumps]))
     if not LEAST_FRICTION < coulomb < MOST_FRICTION:
         jump = f"at its reversals the force jumps by {2 * coulomb:.3g} N"
@@ -449,5 +456,6 @@ def _match_steps(
             used[hits[0]] = True
             delays.append(max(int(made[hits[0]] - turn), 0))
     wrong = made[~used]
+    # Both searches find the same place exactly if no crowded reversal lies in between.
     near = np.searchsorted(crowded, wrong - within) != np.searchsorted(crowded, wrong + within)
     return delays, int(np.sum(~near))

@@ -209,6 +209,8 @@ class _Trial:
         nominal = tuple(effect.nominal(self.plant).values())
         starts = self._starts(effect)
         sizes = sorted(starts.values, key=lambda values: abs(values[0] - nominal[0]))
+        # Only the first parameter is made small; the others keep the values of the smallest
+        # start, as an effect may need them to act at all.
         little = (nominal[0] + starts.steps[0], *sizes[0][1:])
         for values in (little, *sizes):
             if values == nominal:
@@ -241,6 +243,7 @@ class _Trial:
             return np.ravel(target - self._predict(with_values(self.plant, combination, values)))
 
         start = np.ones(len(combination))
+        # diff_step is relative to the start at 1, so one step is one of the effects' own steps.
         fit = least_squares(residual, start, diff_step=1.0, max_nfev=EVALUATIONS)
         return change > 0.0 and float(np.linalg.norm(fit.fun)) < UNEXPLAINED * change
 
@@ -262,6 +265,8 @@ def _propose(shape: Array, rivals: Mapping[str, Array]) -> Iterator[tuple[str, .
     gram, shared = columns @ columns.T, columns @ shape
 
     def residual(chosen: list[int]) -> float:
+        # For unit vectors: ‖shape − projection‖² = 1 − tᵀ G⁻¹ t with the Gram matrix G of the
+        # chosen.
         part, target = gram[np.ix_(chosen, chosen)], shared[chosen]
         return 1.0 - float(target @ np.linalg.lstsq(part, target, rcond=RANK)[0])
 

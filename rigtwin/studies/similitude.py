@@ -60,6 +60,7 @@ def dimension(unit: str) -> Dimension:
         lambda raised: "^" + raised[0].translate(_RAISED),
         unit.strip(),
     )
+    # Several slashes divide in turn: m/s/s is m/s².
     above, *below = plain.split("/")
     total = [0, 0, 0]
     for sign, product in ((1, above), *((-1, _denominator(part, unit)) for part in below)):
@@ -245,6 +246,7 @@ def largest_change(
     # Logarithms avoid overflow: a group can contain large powers.
     logarithms = []
     for group in groups:
+        # fsum rounds once, so that the logarithms of a true scaling cancel to zero.
         powers = group.exponents.items()
         logarithms.append(math.fsum(power * math.log(ratios[name]) for name, power in powers))
     # exp(700) is about the largest double.

@@ -110,6 +110,7 @@ class Locus:
     @cached_property
     def crossings(self) -> list[Crossing]:
         """Crossings of the imaginary axis, in the order of the swept values."""
+        # Only intervals where the number of unstable poles changes are searched.
         counts = np.sum(_is_unstable(self.poles), axis=1)
         crossings: list[Crossing] = []
         for i in np.flatnonzero(counts[:-1] != counts[1:]):

@@ -177,6 +177,7 @@ def draw(stability: StabilityMap, out: Path) -> None:
     axes = figure.subplots()
     # Rates of decay span decades on both sides of zero: logarithmic, but linear near zero.
     largest = float(np.abs(stability.rightmost).max())
+    # Equal ends on both sides put the limit of stability at the colour map's neutral middle.
     norm = SymLogNorm(1e-2 * largest, vmin=-largest, vmax=largest)
     across, up = stability.across, stability.up
     shades = axes.pcolormesh(

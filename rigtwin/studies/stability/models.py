@@ -173,6 +173,7 @@ def poles(system: StateSpace) -> np.ndarray:
 
 def rightmost(system: StateSpace) -> complex:
     """Return the pole with the largest real part, in 1/s; of a pair, the one with Im > 0."""
+    # Rounding, so that of a pair with equal real parts the imaginary part decides.
     return complex(max(poles(system).tolist(), key=lambda pole: (round(pole.real, 9), pole.imag)))
 
 

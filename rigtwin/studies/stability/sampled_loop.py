@@ -210,15 +210,18 @@ def mechanics(plant: RigPlant, preload: float) -> tuple[Array, Array, Array]:
     cell[FORCE], cell[SPEED] = 1.0, motor.viscous
     # The tyre is linearised where it carries the preload.
     squeezed, step = initial_deflection(plant, preload), 1e-6
+    # A central difference: the tyre's law may be nonlinear.
     around = tyre_force(plant.tyre, np.array([squeezed - step, squeezed + step]), np.zeros(2))
     # A gas spring acts between plate and wheel, linearised at rest.
     gas = stiffness(plant.gas_spring, 0.0) if plant.gas_spring.force > 0.0 else 0.0
     a[WHEEL, SPEED] = 1.0
+    # Newton's law of the wheel: the suspension pushes it down, the tyre up, the rail brakes it.
     a[SPEED] = -cell + gas * plate
     a[SPEED, WHEEL] -= (around[1] - around[0]) / (2.0 * step) + gas
     a[SPEED, SPEED] -= plant.tyre.damping + plant.rail.viscous
     a[SPEED] /= plant.carriage.mass
     c[0] = c[1] = plate
+    # Travel = plate − wheel.
     c[1, WHEEL] -= 1.0
     c[2] = cell
     return a, b, c
@@ -273,6 +276,7 @@ def linear_controller(
     # At rest the structure model carries its weight, so that nothing moves.
     rest = np.array([0.0, settings.start, 0.0, settings.sprung_mass * settings.gravity])
     start = initial_state(controlling)
+    # One tick at rest fills the filters' memories, which start empty.
     state, _ = update(controlling, start, Measurements(*rest.tolist()), demand)
     numbers = np.array(packed(state), dtype=float)
 

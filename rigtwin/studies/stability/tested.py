@@ -67,6 +67,8 @@ def configure_vehicle(car: QuarterCar) -> Configuration:
             tyre=Tyre(car.tyre_stiffness, car.tyre_damping),
         ),
         controller=Settings(
+            # The wheel rests on a tyre compressed by the preload, so the plate starts that much
+            # lower.
             start=-preload / car.tyre_stiffness,
             sprung_mass=car.sprung_mass,
             suspension_stiffness=car.suspension_stiffness,

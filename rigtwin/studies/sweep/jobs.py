@@ -115,6 +115,7 @@ def iterate_results(
                     ) from None
                 submit((key, argument))
                 continue
+            # Counts of jobs that are done would otherwise grow with the sweep.
             losses.pop(key, None)
             yield key, result
             for job in islice(coming, ahead - len(waiting)):

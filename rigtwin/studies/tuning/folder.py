@@ -71,6 +71,7 @@ def write(folder: Path, result: TuningResult, twin: Configuration) -> list[Path]
             pages[f"tuned-{point + 1}.toml"] = text.toml(result, point)
     try:
         folder.mkdir(parents=True, exist_ok=True)
+        # Files of an earlier study with more points would pass for results of this one.
         for old in (*folder.glob("tuned*.toml"), *(folder / f"{name}.png" for name in CAPTIONS)):
             old.unlink(missing_ok=True)
         for name, content in pages.items():

@@ -56,6 +56,7 @@ class TuningParameter:
         if self.logarithmic:
             # Equal shares are equal ratios on a logarithmic scale.
             value = self.low * (self.high / self.low) ** share
+        # Rounding may leave the bounds by half a digit.
         return min(max(float(f"{value:.{DIGITS - 1}e}"), self.low), self.high)
 
     def share(self, value: float) -> float:

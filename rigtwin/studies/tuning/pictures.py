@@ -40,6 +40,7 @@ def plot_search(result: TuningResult) -> Figure:
         violating = {"color": NEUTRAL, "markersize": 4, "label": "violates a constraint"}
         axis.plot(number[~allowed], figures[~allowed], "x", **violating)
         axis.plot(number[allowed], figures[allowed], ".", color=SENSED, label="allowed")
+        # The running minimum is one of costs, of which less is better.
         sign = -1.0 if measure.more else 1.0
         costs = np.where(allowed & np.isfinite(figures), sign * figures, np.inf)
         # Running minimum of the cost; infinite until the first allowed candidate.
