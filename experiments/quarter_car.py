@@ -30,6 +30,7 @@ GAS = GasSpring(force=120.0, length=0.5, exponent=1.2)
 A stiffer gas spring is unstable with the rig's delays.
 """
 ON_GAS = Settings(
+    # The preload of 100 N and the gas spring's 120 N press the tyre of 50 kN/m together.
     start=-220.0 / 50_000.0,
     preload=100.0,
     suspension_stiffness=300.0,

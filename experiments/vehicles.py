@@ -141,6 +141,7 @@ def find_vehicle(name: str) -> QuarterCar:
             settings.sprung_mass,
         )
     }
+    # Table 6.1 has no tyre damping, as in `configuration`.
     for vehicle_name, vehicle in VEHICLES.items():
         cars[vehicle_name] = QuarterCar(tyre_damping=0.0, **vehicle._asdict())
     if name not in cars:

@@ -268,6 +268,7 @@ def tune_compensator(
     start = tunable.start()
     first_criterion = objective(start)
     best, best_criterion = _descend(objective, start, evaluations)
+    # A simplex that found nothing better must not make the compensator worse.
     if best_criterion >= first_criterion:
         best, best_criterion = start, first_criterion
     initial, tuned = tunable.values(start), tunable.values(best)

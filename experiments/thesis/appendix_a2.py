@@ -80,6 +80,7 @@ def _a2_2() -> tuple[LocusCase, ...]:
     cases = []
     for number, ratio, lag, figure in OF_STIFFNESS:
         name, variations = f"A2.{figure}", SLOW if lag == 0.2 else QUICK
+        # The thesis compares structure MIL with suspension MIL over the same sweep.
         beside = locus("suspension", variations[ratio])
         note = (
             "the caption of Figure A2.8 says ζ = 1.5, Table A2.2 0.5: the table is right"

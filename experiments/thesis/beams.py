@@ -79,6 +79,7 @@ def jobs(seeds: int) -> Mapping[str, Job]:
 def _on_spring(settings: Settings) -> np.ndarray:
     """Return the frequencies of the modes that move the centre on a spring, Hz."""
     mass, stiffness = assembled(settings)
+    # The spring acts on the heave of the centre node alone.
     stiffness[HEAVE, HEAVE] += ON_A_SPRING
     squares, shapes = eigh(stiffness, mass)
     return np.sqrt(np.abs(squares[np.abs(shapes[HEAVE]) > 1e-3])) / (2 * math.pi)
@@ -107,6 +108,7 @@ def _structure(settings: Settings) -> list[Entry]:
     mass, _ = assembled(settings)
     # A unit heave of all nodes: uᵀ M u is the mass that a rigid motion feels.
     upward = np.zeros(FREEDOMS)
+    # Every node has six degrees of freedom, of which one is heave.
     upward[HEAVE::6] = 1.0
     weight = float(upward @ mass @ upward)
     sprung, worst = _on_spring(settings), _reduction_error(settings)
@@ -263,6 +265,7 @@ def _modes_drawing(settings: Settings) -> Drawing:
     for number in range(4):
         shape = model.wing[number] / np.abs(model.wing[number]).max()
         label = f"{model.frequencies[number]:.2f} Hz"
+        # Opposite arms move alike in a mode that the centre feels; the centre itself counts once.
         both_arms = np.concatenate([shape[::-1], shape[1:]])
         axes[0][0].plot(
             np.concatenate([-distance[::-1], distance[1:]]), both_arms, marker=".", label=label
@@ -346,6 +349,7 @@ def _spectrum(results: dict[str, Result]) -> Drawing:
         result = results[f"{name}/{SHOWN_SEED}"]
         step = float(np.asarray(result["time"])[1])
         for kind, style in (("plate", "-"), ("ideal plate", ":")):
+            # A linear trend is removed, since it would leak into all lines of the spectrum.
             frequencies, power = welch(
                 np.asarray(result[kind]), fs=1 / step, nperseg=512, detrend="linear"
             )

@@ -28,6 +28,7 @@ def errors_of(results: Mapping[str, Result], loop: str, row: str) -> dict[str, A
             for key in ("tracking", "numerical", "spike")
         }
     else:
+        # Sorted as numbers: as text, seed 10 would come before seed 2.
         seeds = sorted(
             (key for key in results if key.startswith(f"{loop}/")),
             key=lambda key: int(key.partition("/")[2]),
@@ -148,6 +149,8 @@ def two_step(first: float, wait: float | None) -> tuple[Array, Array, Array]:
     time = (np.arange(900) - 50) * period
     error, force = np.empty(900), np.empty(900)
     for tick, now in enumerate(time):
+        # Coulomb friction jumps from one sign to the other; only the change by `jump` matters
+        # here.
         force_at_mass = motor - (jump if now >= 0 else 0.0)
         error[tick], force[tick] = -force_at_mass, motor
         step = 0.0 if now < 0.004 else jump * (first if wait is None or now < 0.004 + wait else 1.0)

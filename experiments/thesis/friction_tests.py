@@ -90,6 +90,7 @@ def spikes(test: ThesisTrial) -> Array:
     velocity = np.gradient(gaussian_filter1d(test.travel, 2), period)
     reversals = np.flatnonzero(np.diff(np.sign(velocity)) != 0)
     window = round(AFTER / period)
+    # Padding at both ends by a window lets the first and last reversal count as isolated.
     reversals = reversals[
         (np.diff(reversals, prepend=-window) > window)
         & (np.diff(reversals, append=len(velocity) + window) > window)
@@ -100,6 +101,7 @@ def spikes(test: ThesisTrial) -> Array:
     error = test.simulation.commands[:, 2] - filtered
     # Three ticks later the sign is safe: at the reversal itself the velocity is zero.
     directions = np.sign(velocity[reversals + 3])
+    # The three ticks before the reversal are left out, as its tick is uncertain by some ticks.
     before = np.array([np.mean(error[reversal - 15 : reversal - 3]) for reversal in reversals])
     peaks = np.array(
         [
@@ -210,6 +212,7 @@ def detect_reversals(
     )
     velocity = np.gradient(gaussian_filter1d(ran.truth[:, 2], 2), period)
     reversals = np.flatnonzero(np.diff(np.sign(velocity)) != 0)
+    # The motion fades in at first, and its small reversals prove nothing.
     reversals = reversals[reversals > 1000]
     directions = np.sign(velocity[reversals + 3])
     detection_ticks = np.flatnonzero(steps)
@@ -218,6 +221,8 @@ def detect_reversals(
         for turn, direction in zip(reversals, directions, strict=True)
     ]
     delays = [
+        # Windows begin two ticks early, as the reversal's own tick is uncertain; −2 restores its
+        # origin.
         np.flatnonzero(steps[turn - 2 : turn + 40] == direction)[0] - 2
         for turn, direction, s in zip(reversals, directions, seen, strict=True)
         if s
@@ -251,6 +256,7 @@ def run_timed_steps(offset: float | None, seed: int = 0) -> Result:
     levels = np.sign(velocity)
     if offset is not None:
         shift = round(offset / period)
+        # A shift in time, with the first or last direction held at the end that becomes empty.
         levels = (
             np.concatenate([np.full(shift, levels[0]), levels[:-shift]])
             if shift > 0

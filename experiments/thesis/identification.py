@@ -95,12 +95,15 @@ def cylinder_response(seed: int) -> Response:
         return np.column_stack(
             [
                 np.zeros_like(time),
+                # The multisine starts at zero, so that the cylinder does not jump at the first
+                # tick.
                 settings.start + position - position[0],
                 np.full_like(time, 200.0),
             ]
         )
 
     commands, measured = _average_test(demanded, seed)
+    # A command held over a tick of 1 ms acts half a tick late on average.
     hold = np.exp(2j * math.pi * np.arange(1, FITTED + 1) * 0.5e-3)
     return _ratio(measured[:, 1], commands[:, 1], FITTED) * hold
 
@@ -188,6 +191,7 @@ def _press_tyre(seed: int) -> Result:
     force = 200.0 + 1200.0 * (0.5 - 0.5 * np.cos(2 * math.pi * time / 40.0))
     demands = np.column_stack([np.zeros_like(time), np.full_like(time, settings.start), force])
     ran = simulate(configuration, demands, seed)
+    # Wheel = plate − travel, both true.
     wheel = ran.truth[:, 1] - ran.truth[:, 2]
     shown = slice(None, None, 40)
     return {"force": ran.truth[shown, 3], "deflection": -wheel[shown]}

@@ -27,6 +27,7 @@ def all_hold(*judges: Judge) -> Judge:
     """Return a judge that holds if all judges hold."""
 
     def judge(locus: Locus) -> tuple[bool, str]:
+        # Every judge is called, also after one has failed, so that the finding is complete.
         findings = [each(locus) for each in judges]
         return all(holds for holds, _ in findings), "; ".join(
             dict.fromkeys(words for _, words in findings)

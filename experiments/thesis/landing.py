@@ -92,6 +92,7 @@ def touch_down(landing: Landing, instants: Array) -> Array:
     hanging = (landing.gas_force + landing.unsprung_mass * landing.gravity) / (
         landing.stop_stiffness + stiffness(spring, 0.0)
     )
+    # The wheel touches the ground at t = 0.
     start = [hanging, 0.0, -landing.velocity, -landing.velocity]
     span = (float(instants[0]), float(instants[-1]))
     # The stop and the tyre make the forces non-smooth; the step limit keeps them from being missed.

@@ -111,6 +111,7 @@ COLUMNS_5_13 = tuple(
 def _real_part(model: str, car: QuarterCar, lag: float, mode_name: str) -> float:
     """Return the largest real part of the oscillating poles of a mode, 1/s."""
     car_poles = poles(MODELS[model](car, lag)).tolist()
+    # Of each pair the pole above the real axis; the filters' real poles have no mode.
     return max(pole.real for pole in car_poles if pole.imag > 0.0 and mode(car, pole) == mode_name)
 
 

@@ -30,6 +30,7 @@ AROUND = np.array(ARBITRARY._replace(tyre_damping=10.0))
 
 def statements() -> list[Entry]:
     """Return the entries of the statements of §5.3 to §5.6."""
+    # A fixed seed, as the statement is about these vehicles and must not change from run to run.
     random = np.random.default_rng(0)
     # Log-normal factors with σ = 1: most parameters stay within a factor of 7 of the median.
     cars = [
@@ -38,6 +39,7 @@ def statements() -> list[Entry]:
     ]
     # Eq. 5.57, τ_c = b/k, is derived without tyre damping.
     undamped = [car._replace(tyre_damping=0.0) for car in cars]
+    # Largest |τ_c k/b − 1|, which vanishes if the equation holds.
     deviation = max(
         abs(
             _time(critical_lag(LOOPS["suspension"](car)))
@@ -203,6 +205,8 @@ def _first_mode(model: str, car: QuarterCar) -> str | None:
 def _wheel_too(car: QuarterCar) -> bool:
     """Return whether a lag of the structure can make the wheel hop unstable, alone or not."""
     critical = _time(critical_lag(LOOPS["structure"](car)))
+    # Behind the critical lag one mode is unstable already; the question is whether the wheel hop
+    # follows.
     sweep = Locus("structure", critical * BEYOND, lambda lag: Setting(car, lag))
     return any(WHEEL in sweep.unstable_modes(float(lag)) for lag in sweep.values)
 

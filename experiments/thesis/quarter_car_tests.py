@@ -59,6 +59,7 @@ def _run(
 def _observations(test: ThesisTrial) -> dict[str, float]:
     """Return what the thesis reads off its plots: overshoot, force at rest, motion of the wheel."""
     period = test.configuration.timing.period
+    # The drop takes place within 3 s; from 12 s on the rig stands.
     early, late = slice(0, round(3 / period)), slice(round(12 / period), None)
     while_hopping = slice(round(1.5 / period), round(4.0 / period))
     # Slower than 0.1 mm/s counts as standing still: friction holds the wheel.
@@ -92,9 +93,11 @@ def _body_frequency(position: Array, period: float) -> float:
     NaN stands for fewer than three crossings in the first 4 s.
     """
     early = position[: round(4 / period)]
+    # The rest position is the mean of the last 2 s.
     crossings = np.flatnonzero(
         np.diff(np.sign(early - np.mean(position[-round(2 / period) :]))) != 0
     )
+    # Every second crossing has the same direction, so crossings 0 and 2 are one period apart.
     return float(1.0 / (period * (crossings[2] - crossings[0]))) if len(crossings) > 2 else math.nan
 
 
@@ -339,6 +342,7 @@ def _damped_wheel() -> tuple[bool, str]:
         plant = configuration.plant._replace(
             tyre=configuration.plant.tyre._replace(damping=damping)
         )
+        # 4000 ticks of 1 ms; the hop is judged from 0.6 to 1.6 s, after its first swing.
         wheel = simulate_ideal(configuration._replace(plant=plant), np.zeros(4000)).wheel
         remaining.append(float(np.std(hop(wheel, 1e-3)[600:1600])))
     return remaining[1] < 0.1 * remaining[

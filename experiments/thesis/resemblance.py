@@ -143,6 +143,8 @@ def body_unstable_at_end(locus: Locus) -> tuple[bool, str]:
 
 def undamped_at_boundary(locus: Locus) -> tuple[bool, str]:
     """Judge whether the modes cross at the frequencies of the undamped vehicle."""
+    # Both crossings belong to the same vehicle, unless the sweep changes it; then the first
+    # counts.
     car = locus.at(locus.crossings[0].value).car._replace(suspension_damping=0.0, tyre_damping=0.0)
     undamped = (
         ideal_single_mass(car.sprung) if locus.model == "single-mass" else ideal_quarter_car(car)
@@ -173,12 +175,14 @@ def undamped_at_end(mode: str) -> Judge:
 def _relative_distances(locus: Locus, value: float) -> dict[str, float]:
     """Return for each mode the largest relative distance of an ideal pole from its counterpart."""
     ideal, poles, car = locus.ideal_at(value), locus.poles_at(value), locus.at(value).car
+    # Relative to the ideal pole's magnitude, so that slow and fast modes count alike.
     distances = np.abs(ideal[:, None] - poles[None, :]) / np.abs(ideal)[:, None]
     # The lagged model has more poles than the ideal one; the assignment of the smallest total
     # distance picks each ideal pole's counterpart.
     rows, columns = linear_sum_assignment(distances)
     largest: dict[str, float] = {}
     for row, column in zip(rows, columns, strict=True):
+        # The ideal pole decides on the mode, as the counterpart's shape may have changed.
         mode = locus.mode(car, complex(ideal[row]))
         largest[mode] = max(largest.get(mode, 0.0), float(distances[row, column]))
     return largest

@@ -98,6 +98,7 @@ def ride_measures(test: ThesisTrial) -> dict[str, Array | float]:
 def job_result(test: ThesisTrial, seed: int) -> Result:
     """Return the stored result of a test, with its curves for the drawn seed."""
     result = ride_measures(test)
+    # Curves are large, and drawn for one seed alone.
     if seed == SHOWN_SEED:
         result |= curves(test)
         result["asked damper"] = _damper(test)[::SHOWN]
@@ -120,6 +121,7 @@ def _wing(test: ThesisTrial) -> Array:
 def _damper(test: ThesisTrial) -> Array:
     """Return the demanded force without preload and spring, N, shape (ticks,)."""
     settings, packed = test.configuration.controller, states_of(test)
+    # Demand = preload − k · travel + damper force, solved for the damper.
     return (
         test.simulation.commands[:, 2]
         - settings.preload

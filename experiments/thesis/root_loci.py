@@ -51,6 +51,7 @@ def _tables() -> list[Entry]:
                     "Ns/m",
                 )
             )
+        # ω = √(k/m) at the end of the sweep of k_s.
         end = math.sqrt(1e5 / ARBITRARY.sprung_mass)
         entries.append(
             digits(

@@ -200,6 +200,7 @@ def _highest(locus: Locus, row: int) -> complex:
 def _beyond(locus: Locus, end: str) -> tuple[complex, complex]:
     """Return the pole of the highest frequency past an end of the sweep, 10³ and 10⁶ times."""
     value = float(locus.values[0] if end == "start" else locus.values[-1])
+    # Sweeps run over ratios, so both ends are extended by factors.
     factors = (1.0 / BEYOND, BEYOND**-2) if end == "start" else (BEYOND, BEYOND**2)
     near, far = (
         max(locus.poles_at(value * factor).tolist(), key=lambda pole: pole.imag)

@@ -268,6 +268,7 @@ VARIABLES = {
 
 def _equation_6() -> list[Entry]:
     """Return the entries of the dimensionless groups (Eq. 3.6) and the scale factors (Eq. 3.8)."""
+    # Repeating variables stand for mass, length and time, as in the thesis.
     groups = pi_groups(VARIABLES, ("m_s", "x_s", "t"))
     ours = ", ".join(str(group) for group in groups)
     printed = (
@@ -308,6 +309,7 @@ def _equation_6() -> list[Entry]:
 
 def _change_of_groups() -> float:
     """Return the largest violation of Eq. 3.8, and of the groups, by arbitrary scale factors."""
+    # Arbitrary, unrelated factors: relations that hold only for round numbers would fail.
     scale = scaling(VARIABLES, {"m_s": 0.0123, "x_s": 0.345, "t": 6.78})
     # Eq. 3.8: both sides of every relation are products of scale factors.
     relations = (
@@ -423,6 +425,7 @@ def _cylinder() -> list[Entry]:
 
 def _charge(spring: GasSpring) -> list[Entry]:
     """Return the entries of area, volume and pressure of the cylinder and its accumulator."""
+    # The spring's gas acts on the annulus around the rod.
     where, area = "§3.5", math.pi / 4.0 * (BORE**2 - ROD**2)
     charge, plain = (find_charge(spring, a, RIG_STROKE) for a in (area, number("0.0012")))
     bar = 1e-5
@@ -557,9 +560,12 @@ def _remarks(real: Scaling, slow: Scaling, off: float) -> list[str]:
         1e-5 * find_charge(at_scale(BOEING, each).spring, area, RIG_STROKE).pressure
         for each in (real, slow)
     ]
+    # The gas spring as hardware keeps its force, so the force's scale is prescribed instead of
+    # the mass's.
     force_preserving = scaling(
         UNITS, {"gas_force": real.factor("N"), "stroke": real.length, "time": slow.time}
     )
+    # Without lift the full weight acts from touch-down on, as in the printed equation.
     no_lift = float(np.max(touch_down(BOEING._replace(lift=0.0), INSTANTS)[0]))
     inside = float(np.max(touch_down(BOEING, INSTANTS)[0]))
     return [

@@ -139,6 +139,7 @@ def _table_5_5() -> tuple[LocusCase, ...]:
     # The sweep starts at the high ratio, so `start` of a judge means strong damping.
     slow, quick = (locus(MODEL, RATIOS[lag]) for lag in (0.2, 0.01))
     further = shapes.asymptote_left_of(slow, "τ = 0.2 s")
+    # ζ = b/(2 √(k m)) = b/(2 k) with b = 100 Ns/m and k = m.
     at_ratio_0_005 = 1e4  # k = m, in N/m and kg
     note = "at 0.005 it is on the boundary, b/k = τ, and below it, in the printed range, unstable"
     low = (-0.6, 0.2, 1.6)

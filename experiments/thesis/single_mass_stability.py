@@ -49,6 +49,7 @@ def _pole_entries(
     where: str, system: str, printed: Sequence[str], computed: np.ndarray, notes: Mapping[str, str]
 ) -> list[Entry]:
     """Return entries for the printed poles, each with its computed counterpart."""
+    # Python writes the imaginary unit as j.
     values = np.array([complex(text.replace(" ", "").replace("i", "j")) for text in printed])
     # The square root favours exact pairs, so a single misprint does not disturb the other pairs.
     rows, columns = linear_sum_assignment(np.sqrt(np.abs(values[:, None] - computed[None, :])))

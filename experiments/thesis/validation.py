@@ -60,6 +60,7 @@ def _acceleration_response(test: ThesisTrial) -> tuple[np.ndarray, np.ndarray, n
     """
     period = test.configuration.timing.period
     ground = np.gradient(test.simulation.commands[:, 0], period)
+    # Windows of 20 s resolve 0.05 Hz; they overlap by three quarters.
     options = {"fs": 1 / period, "nperseg": 20_000, "noverlap": 15_000, "detrend": "linear"}
     frequencies, power = welch(ground, **options)
     shown = (frequencies > 0) & (frequencies <= 2.0)
@@ -224,6 +225,7 @@ def _response(results: Mapping[str, Result]) -> Drawing:
     for kind, colour, label in (("ideal response", IDEAL, "ideal"), ("response", SENSED, "twin")):
         median = np.median([np.asarray(result[kind]) for result in roads], axis=0)
         axis.semilogy(frequencies[inside], median[inside], color=colour, marker=".", label=label)
+        # Pale beyond the road's band, where both spectra are noise.
         axis.semilogy(frequencies[~inside], median[~inside], color=colour, alpha=0.35)
     axis.axvline(0.576, color="black", linewidth=0.6, linestyle=":")
     axis.set(

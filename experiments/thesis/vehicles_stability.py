@@ -89,6 +89,7 @@ def drop(system: StateSpace, car: QuarterCar, time: np.ndarray) -> dict[str, np.
 def _start(system: StateSpace, car: QuarterCar) -> np.ndarray:
     """Return the initial state, relative to the rest after the drop, with every filter settled."""
     force = UNLOADED * car.sprung_mass * Settings().gravity
+    # Before the release both springs lack the unsupported force F, and are longer by F/k.
     travel, wheel = force / car.suspension_stiffness, force / car.tyre_stiffness
     start = {
         "force": force,
@@ -206,6 +207,7 @@ def _share(car: QuarterCar, part: str) -> float:
     """Return the initial amplitude of the rightmost mode in a drop, m."""
     system = rig(car, RIG)
     values, vectors = np.linalg.eig(np.asarray(system.A))
+    # The initial state as a sum of modes: V w = x(0).
     weights = np.linalg.solve(vectors, _start(system, car))
     row, column = system.state_labels.index(part), int(np.argmax(values.real))
     # The pair of conjugate modes adds up to twice the modulus of one.

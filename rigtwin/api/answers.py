@@ -111,6 +111,7 @@ def diagnose(
     ['viscous@motor']
     """
     data = read_data(recordings, machine, held_out, columns, test)
+    # Excluded effects leave the machine itself, so that no later step can propose them again.
     described = data.machine.excluding(names_of("exclude", exclude))
     require_unrecorded(settings, described, [*data.recordings, *data.held_out])
     base = twin_of(described, settings, without)
@@ -166,6 +167,7 @@ def read_data(
     if needs_description(machine, logs):
         if not logs:
             raise RigtwinError("no recording to diagnose")
+        # The first log decides on columns and units; the others must follow it to be comparable.
         described = describe(machine, logs[0], columns=columns, test=test)  # type: ignore[arg-type]
         recordings = [record_log(described, log) for log in logs]
         held_out = [record_log(described, log) for log in _as_list(held_out)]
@@ -354,6 +356,8 @@ def calibrate(recording: Recorded) -> Calibration:
     configuration = machine.configuration_of(recording)
     require_fit(machine, recording, configuration)
     calibration = machine.physics.find_compensator(recording, configuration)
+    # A compensator that misses reversals or steps falsely adds force errors of twice the
+    # friction.
     if (
         calibration.detected < LEAST_DETECTED * calibration.reversals
         or calibration.false > MOST_FALSE * calibration.reversals
@@ -374,5 +378,6 @@ def _as_list(recordings: Recorded | Sequence[Recorded]) -> list[Recorded]:
 
 def _has_duplicate(recordings: Sequence[reader.Recording]) -> bool:
     """Return whether two recordings are the same file. Those in memory have none."""
+    # Resolved, since links and relative paths may name one file twice.
     paths = [recording.path.resolve() for recording in recordings if recording.path.exists()]
     return len(set(paths)) < len(paths)

@@ -119,6 +119,7 @@ def serve_card(
     RigtwinError
         For a mistake in an argument, a port in use, or a missing package.
     """
+    # Before the imports below, which need the same optional package.
     require_client()
     from rigtwin.hardware.daq.transport import LOCAL, serve
 
@@ -135,6 +136,7 @@ def serve_card(
         table.device,
         f"{LOCAL}:{open_port}",
         lambda: virtual.tick,
+        # Half a second lets running calls end; then the port is free.
         lambda: server.stop(0.5).wait(),
     )
 
@@ -276,6 +278,7 @@ def check_card(
         show(rest)
         corrected = set_spans(corrected, rest, present) if present else corrected
         corrected = set_zeros(corrected, rest, zeros) if zero else corrected
+    # The corrections may have changed what a line can carry.
     require_ranges(corrected, Configuration().safety)
     return TableCheck(sign_off(corrected, operator, note, date.today()), rest, changes)
 

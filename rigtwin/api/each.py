@@ -83,11 +83,13 @@ def _answer(job: _Job) -> dict[str, Any]:
                 path, machine=job.machine, settings=job.settings, without=job.without
             ).document()
         except RigtwinError as error:
+            # The temporary path must not be stored: it means nothing to the next reader.
             return {"error": str(error).replace(str(path), _PLACEHOLDER)}
         finally:
             # Without this, the process grows by several MB per recording.
             return_memory()
     text = json.dumps(finite(document), allow_nan=False)
+    # Without its quotes, the path as JSON writes it: backslashes of Windows are doubled there.
     return {"answer": text.replace(json.dumps(str(path))[1:-1], _PLACEHOLDER)}
 
 
@@ -153,6 +155,7 @@ def diagnose_each(
     refused: dict[Path, str] = {}
     keys: dict[Path, str] = {}
 
+    # A generator: recordings are read when a worker is free, so few are in memory at once.
     def jobs() -> Iterator[tuple[str, _Job]]:
         for path in paths:
             try:
@@ -168,6 +171,8 @@ def diagnose_each(
                     # Validate the settings once per machine: an invalid one ends the whole call.
                     twin_of(described, changes, without)
                     validated.add(described.path)
+                # The answer also depends on the description and its model, so their content
+                # enters the key.
                 keys[path] = _digest(data, options.encode(), *map(Path.read_bytes, described.files))
                 yield (
                     keys[path],
@@ -179,6 +184,7 @@ def diagnose_each(
     def count(more: int) -> None:
         nonlocal done
         done += more
+        # Refused recordings never become jobs, but are finished as well.
         progress(done + len(refused), len(paths))
 
     with Store(out / STORE) as store, open_workers(workers, cluster) as pool:

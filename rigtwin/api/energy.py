@@ -49,6 +49,8 @@ def energy_error(
     """
     recording = resolve_recording(recording)
     described = described_machine(recording, machine)
+    # With a user's controller the recording does not say what vehicle it emulates; only given
+    # settings do.
     custom = OWN in recording.controller and bool(settings)
     known = experiments_of(described)
     start = known[recording.experiment].configuration if recording.experiment in known else None

@@ -110,6 +110,7 @@ def faults(
     channels = load_table(Path(card))
     custom = None if controller is None else custom_controller(controller)
     todo = _draw(seed, per_kind, per_process_kind)
+    # A dictionary: each experiment's test is built once, however many faults use it.
     tests = {
         name: replace(test, configuration=with_changes(test.configuration, settings))
         for name, test in ((fault.experiment, find(fault.experiment)) for fault in todo)
@@ -128,6 +129,7 @@ def faults(
                         results.append(try_process_fault(*session))
                     else:
                         results.append(try_fault(*session, custom))
+                # A session that could not be run is reported, and does not end the campaign.
                 except RigtwinError as error:
                     undone.append(f"{fault.kind.name}, seed {fault.seed}: {error}")
         except KeyboardInterrupt:
@@ -142,5 +144,6 @@ def _draw(seed: int, per_kind: int, per_process_kind: int) -> list[InjectedFault
     killing = [kind for kind in KINDS if kind.place == "process"]
     return [
         *draw_faults(per_kind * len(within), seed, within),
+        # Another seed, or the two draws would be the same random numbers.
         *draw_faults(per_process_kind * len(killing), seed + 1, killing),
     ]

@@ -81,6 +81,7 @@ def fit(
     chosen = find_effects(data.machine, names)
     base = twin_of(data.machine, settings)
 
+    # Copies count twice in the fit, and held-out copies would be no test of it.
     recordings_kept, copies = drop_copies(data.recordings)
     refuse_copies(data.held_out, recordings_kept)
     fitted, short = drop_short(recordings_kept)

@@ -101,6 +101,7 @@ def show_look(
         missing.
     """
     start = None if diagnosis is None else read_diagnosis(diagnosis, look)
+    # Imported late: the page's packages are optional.
     with _needs_viser():
         from rigtwin.looking.local_server import open_server
         from rigtwin.looking.page import Page

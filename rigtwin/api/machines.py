@@ -105,6 +105,7 @@ def machine_of(recording: reader.Recording) -> Machine:
     description = recording.description
     if description is not None and description.is_file():
         resolved = catalogue.find(str(description))
+        # A description that was overwritten by another machine's must not be used silently.
         if resolved.name == recording.machine:
             return resolved
         why = f"but its description {description} describes {resolved.name!r}"
@@ -218,6 +219,7 @@ def _values(value: float | Mapping[str, float]) -> str:
     """Return an effect's values as text; the first parameter's name is left out."""
     if not isinstance(value, Mapping):
         return repr(float(value))
+    # An effect's main parameter comes first, and its name is implied by the effect's.
     first, *rest = value.items()
     return ",".join([repr(float(first[1])), *(f"{name}={number!r}" for name, number in rest)])
 
@@ -255,6 +257,7 @@ def twin_of(
         allowed = (
             group in machine.plant._fields
             or (group == "controller" and machine.physics.compares_controller)
+            # The integration step is the twin's alone; a recording does not depend on it.
             or (group, name) == ("timing", "timestep")
         )
         # A setting that repeats the nominal value is refused too if it was named: silently
@@ -267,6 +270,7 @@ def twin_of(
             )
     for name in removed:
         base = without_effect(base, name)
+    # Removed effects first: an effect may be replaced by another value of itself.
     return apply_effects(base, effects)
 
 

@@ -167,6 +167,7 @@ def _ghost(
         raise RigtwinError(f"{machine.name}: its twin moves as measured and has no ghost")
     measured, predicted = look.positions(), look.positions(look.nominal)
     return {
+        # The twin's time grid may be coarser than the recording's.
         joint: np.interp(recording.time, look.time, values + magnify * (predicted[joint] - values))
         for joint, values in measured.items()
     }

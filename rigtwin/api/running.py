@@ -94,6 +94,7 @@ def run(
     """
     if not isinstance(seed, int) or seed < 0:
         raise RigtwinError(f"seed {seed!r:.60}: expected a whole number from 0")
+    # Checked before the machine is built, which may take seconds.
     if controller is not None and not callable(getattr(controller, "tick", controller)):
         raise RigtwinError(f"controller {controller!r:.60}: expected a function, or a method tick")
     described = resolve_machine(machine)

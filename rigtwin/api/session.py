@@ -237,6 +237,7 @@ def dry_run(
     virtual, _ = open_virtual_card(test)
     with _stopped_by(stop, stop_file) as asked:
         ended = record_unpaced(virtual, test, Path(path), asked, progress)
+    # A session that ended before its test has no ticks, and cannot be loaded.
     recording = load(Path(path)) if ended.ticks else None
     passed = ended.cause == COMPLETED
     peaks = test.predict_peaks(recording) if recording is not None else ()
@@ -370,6 +371,7 @@ def run_on_card(
         seed=seed,
         controller=controller,
     )
+    # Everything that can refuse is asked before a person is: after arming, the rig moves.
     permission = require_permission(test, Path(card), without_dry_run)
     if not arm(test):
         return None
@@ -440,6 +442,7 @@ def run_session(
     def check(test: PlannedTest) -> object:
         experiment = find_test(test.experiment)
         configuration = check_settings(described, experiment.configuration, test.changes)
+        # Demands are computed as well, since a mistake in them shows only then.
         return experiment.demands(configuration, test.seed)
 
     tests = read_toml(Path(plan), lambda tables: parse_plan(tables, find_test))
@@ -470,6 +473,7 @@ def _alone(folder: Path) -> Iterator[None]:
         raise RigtwinError(
             f"another session is running into {folder}; wait for it, or name another folder"
         ) from None
+    # The lock ends with the file, also if this program is killed.
     with held:
         yield
 

@@ -86,10 +86,12 @@ def watch(
         raise RigtwinError(f"step {step:g} s: expected {STEP:g} to {WINDOW - WARM:g} s")
     if not patience > 0.0:
         raise RigtwinError(f"patience {patience:g} s: expected more than 0 s")
+    # Longer by a step, so that the window is complete after each read.
     growing = GrowingRecording(Path(path), WINDOW + step)
     watching, last_new = None, time.monotonic()
     while not stop():
         now = time.monotonic()
+        # The recording may be awaited before its test has begun.
         if not growing.path.exists() and now - last_new <= patience:
             time.sleep(POLL)
             continue

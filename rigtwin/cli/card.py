@@ -203,6 +203,7 @@ def _parse_values(texts: Sequence[str], option: str) -> dict[str, float]:
 def _parse_directions(texts: Sequence[str]) -> dict[str, int]:
     """Return output → direction of each OUTPUT=+ (1) or OUTPUT=- (-1); 0 for any other text."""
     pairs = (text.partition("=") for text in texts)
+    # 0 is no direction; `check_card` refuses it with a message of its own.
     return {name: {"+": 1, "-": -1}.get(sign, 0) for name, _, sign in pairs}
 
 
@@ -215,6 +216,7 @@ def _ask_direction(output: str) -> int:
 
 
 def _ask(question: str, answers: tuple[str, ...]) -> str:
+    # Waiting for an answer that nobody can give would hang a script.
     if not sys.stdin.isatty():
         raise RigtwinError(
             f"no terminal to ask: {question.strip()} (--arm and --moved answer beforehand)"

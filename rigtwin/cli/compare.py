@@ -58,6 +58,7 @@ def execute(parsed: argparse.Namespace) -> int:
         ("replay", "residual rms", "noise floor", "ratio", "most of it, Hz")
     ]
     for name, result in results.items():
+        # Parts of a replay are indented below it.
         rows.append(_row(name, result))
         rows += [_row(f"  {output}", part) for output, part in result.outputs.items()]
     print(table(rows))

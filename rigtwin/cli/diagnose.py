@@ -135,6 +135,7 @@ def execute(parsed: argparse.Namespace) -> int:
         if out is not None:
             if out.suffix.lower() != ending:
                 raise RigtwinError(f"--{name} {out}: expected a name that ends in {ending}")
+            # A missing browser is said now, not after minutes of fits.
             find_browser()
     recordings, held_out = read_recordings(parsed)
     with tqdm(disable=None, unit=" fits", desc="diagnosing", leave=False) as bar:
@@ -157,6 +158,7 @@ def execute(parsed: argparse.Namespace) -> int:
             )
             if parsed.json is not None:
                 write_json(parsed.json, changes.document())
+            # The bar is removed before the answer is printed in its place.
             bar.close()
             print(changes)
             return 0

@@ -147,6 +147,7 @@ def counting_bar(unit: str, title: str) -> Iterator[Callable[[int, int], None]]:
     with tqdm(disable=None, desc=title, unit=unit, leave=False, file=sys.stderr) as bar:
 
         def show(done: int, total: int) -> None:
+            # The total is known only once jobs are counted.
             bar.total = total
             bar.update(done - bar.n)
 

@@ -61,6 +61,7 @@ def execute(parsed: argparse.Namespace) -> int:
 
     def prepare(test: PlannedTest) -> None:
         ready = plan(_command_line(parsed, test), test.experiment)
+        # Built only for its checks: a mistake must show before the first test moves anything.
         ready.operation()
         if real:
             require_permission(ready, parsed.card, parsed.without_dry_run)
@@ -132,6 +133,7 @@ def _run_on_twin(parsed: argparse.Namespace, machine: Machine) -> int:
 
 def _command_line(parsed: argparse.Namespace, test: PlannedTest) -> argparse.Namespace:
     """The command line of one test: its own settings after those of the session."""
+    # Later settings win, so those of the test come last.
     settings = [*parsed.set, *test.settings]
     return argparse.Namespace(**{**vars(parsed), "seed": test.seed, "set": settings})
 

@@ -111,9 +111,11 @@ def execute(parsed: argparse.Namespace) -> int:
             )
     margin = rigtwin.rig_margin(car, compensator=parsed.compensator)
     points = SPARSE if model in AS_RUN else POINTS
+    # Axes are built before anything is printed, as they may refuse a name.
     axes = [around(name, car, tau, points) for name in parsed.map or ()]
     print(", ".join(f"{name.replace('_', ' ')} {value:g}" for name, value in car._asdict().items()))
     print(_printed(stability))
+    # The published rig is shown beside whatever lag was asked for.
     at_rig = rigtwin.stability(car, tau=RIG_LAG).models["rig"]
     words = "stable" if at_rig.stable else "unstable"
     print(

@@ -172,6 +172,7 @@ def _ask_to_arm(test: AnyTest) -> bool:
     try:
         return input("type arm to go: ").strip() == "arm"
     except EOFError:
+        # The end of the input is no consent.
         return False
 
 

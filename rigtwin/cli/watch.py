@@ -52,6 +52,7 @@ def execute(parsed: argparse.Namespace) -> int:
         def tell(now: rigtwin.Watch) -> None:
             bar.n = now.judged
             bar.set_postfix_str(f"alarm level {100.0 * min(now.level, 1.0):.0f} %")
+            # The alarm's text changes as suspects are found; each version is said once.
             if now.alarm is not None and str(now.alarm) not in said:
                 said.append(str(now.alarm))
                 bar.write(said[-1])
