@@ -257,7 +257,7 @@ def twin_of(
         allowed = (
             group in machine.plant._fields
             or (group == "controller" and machine.physics.compares_controller)
-            # The integration step is the twin's alone; a recording does not depend on it.
+            # The integration step belongs to the twin, not to the test.
             or (group, name) == ("timing", "timestep")
         )
         # A setting that repeats the nominal value is refused too if it was named: silently
