@@ -12,7 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from machines import DEFAULT_MACHINE
-from rigtwin.api.machines import Effects, Settings, effect_texts, resolve_machine
+from rigtwin.api.machines import resolve_machine
+from rigtwin.api.twin import Effects, Settings, effect_texts
 from rigtwin.description.changes import with_changes
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.effects import apply_effects

@@ -11,8 +11,9 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from rigtwin.api.answers import diagnose
-from rigtwin.api.machines import Settings, machine_of, machines, resolve_machine, tables_of, twin_of
+from rigtwin.api.machines import machine_of, machines, resolve_machine
 from rigtwin.api.recordings import resolve_recording
+from rigtwin.api.twin import Settings, tables_of, twin_of
 from rigtwin.console import finite
 from rigtwin.description.machine import Machine
 from rigtwin.errors import RigtwinError

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from rigtwin.api.machines import Settings, described_machine
+from rigtwin.api.machines import described_machine
 from rigtwin.api.recordings import resolve_recording
+from rigtwin.api.twin import Settings
 from rigtwin.description.changes import with_changes
 from rigtwin.description.machine import OWN, Machine
 from rigtwin.recording import reader

@@ -8,7 +8,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from experiments import find
-from rigtwin.api.machines import Settings
+from rigtwin.api.twin import Settings
 from rigtwin.description.changes import with_changes
 from rigtwin.description.control import set_up
 from rigtwin.errors import RigtwinError

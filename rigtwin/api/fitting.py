@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from rigtwin.api.answers import Recorded, read_data
-from rigtwin.api.machines import Settings, twin_of
+from rigtwin.api.twin import Settings, twin_of
 from rigtwin.description.machine import Machine
 from rigtwin.diagnosis.copies import drop_copies, refuse_copies
 from rigtwin.diagnosis.data_checks import require_fit

@@ -7,8 +7,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rigtwin.api.machines import Settings, described_machine, twin_of
+from rigtwin.api.machines import described_machine
 from rigtwin.api.recordings import load, resolve_recording
+from rigtwin.api.twin import Settings, twin_of
 from rigtwin.api.watching import PATIENCE, watch
 from rigtwin.description.machine import Machine
 from rigtwin.errors import RigtwinError

@@ -9,8 +9,9 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from rigtwin.api.machines import Effects, Settings, effect_texts, resolve_machine
+from rigtwin.api.machines import resolve_machine
 from rigtwin.api.recordings import Recording, with_machine
+from rigtwin.api.twin import Effects, Settings, effect_texts
 from rigtwin.description.changes import with_changes
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Machine

@@ -6,7 +6,8 @@ import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from rigtwin.api.machines import Settings, described_machine, twin_of
+from rigtwin.api.machines import described_machine
+from rigtwin.api.twin import Settings, twin_of
 from rigtwin.description.machine import Machine
 from rigtwin.errors import RigtwinError
 from rigtwin.recording.growing import GrowingRecording
