@@ -53,6 +53,7 @@ if TYPE_CHECKING:
         machine,
         machines,
     )
+    from rigtwin.api.planning import plan_test
     from rigtwin.api.recordings import Recording, load
     from rigtwin.api.running import run
     from rigtwin.api.session import run_session
@@ -69,14 +70,7 @@ if TYPE_CHECKING:
         rths,
         tune_compensator,
     )
-    from rigtwin.api.supervised import (
-        DryRun,
-        SessionResult,
-        dry_run,
-        plan_test,
-        run_on_card,
-        run_on_twin,
-    )
+    from rigtwin.api.supervised import DryRun, SessionResult, dry_run, run_on_card, run_on_twin
     from rigtwin.api.tuning import TuningResult, tune
     from rigtwin.api.twin import Configuration
     from rigtwin.api.watching import Alarm, Suspect, Watch, watch
@@ -191,11 +185,11 @@ _MODULES = {
     "faults": ("Campaign", "faults"),
     "fitting": ("EffectFit", "fit"),
     "look": ("look", "show_live", "show_look"),
+    "planning": ("plan_test",),
     "supervised": (
         "DryRun",
         "SessionResult",
         "dry_run",
-        "plan_test",
         "run_on_card",
         "run_on_twin",
     ),

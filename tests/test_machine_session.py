@@ -13,7 +13,7 @@ import pytest
 
 import machines
 import rigtwin
-from rigtwin.api.supervised import plan_test
+from rigtwin.api.planning import plan_test
 from rigtwin.cli import main
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq.signals import signals_of

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from operator import itemgetter
 
 import numpy as np
 from scipy.optimize import minimize
@@ -210,6 +211,16 @@ def _descend(
     return optimum.x, float(optimum.fun)
 
 
+def _improve(
+    objective: Callable[[np.ndarray], float], start: np.ndarray, evaluations: int
+) -> tuple[tuple[np.ndarray, float], tuple[np.ndarray, float]]:
+    """Return the start and the best point, each with its value."""
+    # Gains and weights act by their order of magnitude: the search runs over logarithms.
+    first = start, objective(start)
+    # In this order: a simplex that found nothing better must not change the compensator.
+    return first, min(first, _descend(objective, start, evaluations), key=itemgetter(1))
+
+
 def tune_compensator(
     name: str,
     case: int = 4,
@@ -264,20 +275,14 @@ def tune_compensator(
         progress(1)
         return tuning.worst_tracking(law) + tuning.noise_response(law)
 
-    # Gains and weights act by their order of magnitude: the search runs over logarithms.
-    start = tunable.start()
-    first_criterion = objective(start)
-    best, best_criterion = _descend(objective, start, evaluations)
-    # A simplex that found nothing better must not make the compensator worse.
-    if best_criterion >= first_criterion:
-        best, best_criterion = start, first_criterion
+    (start, first), (best, last) = _improve(objective, tunable.start(), evaluations)
     initial, tuned = tunable.values(start), tunable.values(best)
     before, after = tunable.make(**initial), tunable.make(**tuned)
     return TunedCompensator(
         name=name,
         before=initial,
         after=tuned,
-        criterion=(first_criterion, best_criterion),
+        criterion=(first, last),
         judged=(validation.worst_tracking(before), validation.worst_tracking(after)),
         noisy=(validation.noise_response(before), validation.noise_response(after)),
         tests=tuning.tests + validation.tests,

@@ -197,10 +197,8 @@ def check_card(
     ----------
     card
         Channel table to correct, TOML.
-    operator
-        Name of the person who calibrates. It is stored in the table.
-    note
-        Remark that is stored in the table.
+    operator, note
+        Name of the person who calibrates, and a remark. Both are stored in the table.
     zero
         Whether every input is at its reference value now, so that its zero can be set.
     references
@@ -213,10 +211,9 @@ def check_card(
         Stroke of the plates in m, used with `signs`, 0.005 by default.
     directions
         Known direction of motion: output → 1 or -1.
-    arm
-        Function that asks, before anything moves, whether everybody is clear of the rig.
-    ask
-        Function that asks in which direction an output moved, 1 or -1. A virtual card needs none.
+    arm, ask
+        Functions that ask, before anything moves, whether everybody is clear of the rig; and in
+        which direction an output moved, 1 or -1. A virtual card needs neither.
     virtual
         Channel table by which a virtual card is wired. The check then uses it in place of the rig.
     stop
@@ -241,30 +238,12 @@ def check_card(
     zeros, present, known = dict(references or {}), dict(spans or {}), dict(directions or {})
     _require_values(zeros, "reference", table)
     _require_values(present, "span", table)
-    if not LEAST_STROKE <= stroke <= MOST_STROKE:
-        raise RigtwinError(f"stroke {stroke:g}: expected {LEAST_STROKE:g} to {MOST_STROKE:g} m")
-    for name, sign in known.items():
-        if name not in OUTPUTS or sign not in (1, -1):
-            raise RigtwinError(
-                f"moved {name}: expected one of {', '.join(OUTPUTS)} and + or -, such as ground=+"
-            )
+    _require_motion(stroke, known)
     require_ranges(table, Configuration().safety)
     if not (signs or zero or present):
         raise RigtwinError("nothing to check: expected zero, span NAME=VALUE or signs")
     wiring = None if virtual is None else load_table(Path(virtual))
-
-    def find_direction(output: str) -> int:
-        if output in known:
-            return known[output]
-        if wiring is not None:
-            return direction_of_wiring(output, table, wiring)
-        if ask is None:
-            raise RigtwinError(f"direction of {output} is unknown: expected `directions` or `ask`")
-        return ask(output)
-
-    changes: tuple[str, ...] = ()
-    rest: tuple[RestReading, ...] = ()
-    corrected = table
+    corrected, changes, rest = table, (), ()
     # Signs first: zero and span depend on them. The span before the zero: the zero is set at the
     # corrected span.
     if signs:
@@ -272,7 +251,7 @@ def check_card(
             raise RigtwinError("not armed; nothing moved")
         with nullcontext(stop) if stop is not None else stop_requests() as stop_request:
             responses = move_outputs(table, wiring, stroke, stop_request)
-        moved = {output: find_direction(output) for output in OUTPUTS}
+        moved = {output: _direction(output, known, table, wiring, ask) for output in OUTPUTS}
         corrected, changes = correct_signs(table, responses, moved)
     if zero or present:
         rest = look_at_rest(corrected, wiring)
@@ -282,6 +261,34 @@ def check_card(
     # The corrections may have changed what a line can carry.
     require_ranges(corrected, Configuration().safety)
     return TableCheck(sign_off(corrected, operator, note, date.today()), rest, changes)
+
+
+def _require_motion(stroke: float, directions: Mapping[str, int]) -> None:
+    """Raise RigtwinError for a stroke in m, or directions of outputs, that are not allowed."""
+    if not LEAST_STROKE <= stroke <= MOST_STROKE:
+        raise RigtwinError(f"stroke {stroke:g}: expected {LEAST_STROKE:g} to {MOST_STROKE:g} m")
+    for name, sign in directions.items():
+        if name not in OUTPUTS or sign not in (1, -1):
+            raise RigtwinError(
+                f"moved {name}: expected one of {', '.join(OUTPUTS)} and + or -, such as ground=+"
+            )
+
+
+def _direction(
+    output: str,
+    known: Mapping[str, int],
+    table: ChannelTable,
+    wiring: ChannelTable | None,
+    ask: Callable[[str], int] | None,
+) -> int:
+    """Return the direction in which an output moved: as stated, as wired, or as a person says."""
+    if output in known:
+        return known[output]
+    if wiring is not None:
+        return direction_of_wiring(output, table, wiring)
+    if ask is None:
+        raise RigtwinError(f"direction of {output} is unknown: expected `directions` or `ask`")
+    return ask(output)
 
 
 def write_table(table: ChannelTable, path: str | Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -154,16 +155,9 @@ def show_live(
         from rigtwin.looking.local_server import LocalServer, open_server
         from rigtwin.looking.page import Page
 
-    def follow(on_update: Callable[[Watch], object], stop: Callable[[], bool]) -> Watch:
-        return watch(
-            path,
-            machine=machine,
-            settings=settings,
-            without=without,
-            on_update=on_update,
-            patience=patience,
-            stop=stop,
-        )
+    follow = partial(
+        watch, path, machine=machine, settings=settings, without=without, patience=patience
+    )
 
     def look_back(server: LocalServer, watched: Watch) -> Page:
         # While the test ran, only its last seconds were held in memory.

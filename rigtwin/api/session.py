@@ -5,17 +5,18 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
 from machines import DEFAULT_MACHINE
 from rigtwin.api.machines import resolve_machine
-from rigtwin.api.supervised import check_settings
+from rigtwin.api.planning import check_settings
 from rigtwin.description.changes import read_toml
 from rigtwin.description.machine import Machine
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.session.plan import PlannedTest, is_complete, move_aside, parse_plan
 from rigtwin.recording.owner import open_alone
-from rigtwin.simulation.experiment import Experiment, find_experiment
+from rigtwin.simulation.experiment import find_experiment
 
 LOCK = "session.lock"
 """Lock file in a session's folder: only one session at a time writes into a folder."""
@@ -67,21 +68,8 @@ def run_session(
         raised before anything moves.
     """
     folder, described = Path(folder), resolve_machine(machine)
-
-    def find_test(name: str) -> Experiment:
-        return find_experiment(described, name)
-
-    def check(test: PlannedTest) -> object:
-        experiment = find_test(test.experiment)
-        configuration = check_settings(described, experiment.configuration, test.changes)
-        # Demands are computed as well, since a mistake in them shows only then.
-        return experiment.demands(configuration, test.seed)
-
+    find_test = partial(find_experiment, described)
     tests = read_toml(Path(plan), lambda tables: parse_plan(tables, find_test))
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise RigtwinError(f"cannot make {folder}: {error.strerror}") from None
     with _alone(folder):
         return _run_tests(
             tests=tests,
@@ -89,14 +77,26 @@ def run_session(
             run=run,
             resume=resume,
             real=real,
-            prepare=prepare or check,
+            prepare=prepare or partial(_check_planned, described),
             on_message=on_message,
         )
 
 
+def _check_planned(machine: Machine, test: PlannedTest) -> None:
+    """Raise RigtwinError unless a planned test can be run."""
+    experiment = find_experiment(machine, test.experiment)
+    configuration = check_settings(machine, experiment.configuration, test.changes)
+    # Demands are computed as well, since a mistake in them shows only then.
+    experiment.demands(configuration, test.seed)
+
+
 @contextmanager
 def _alone(folder: Path) -> Iterator[None]:
-    """Lock a folder for this session. Raises RigtwinError if another session has locked it."""
+    """Make and lock a session's folder. Raises RigtwinError if another session has locked it."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise RigtwinError(f"cannot make {folder}: {error.strerror}") from None
     try:
         held = open_alone(folder / LOCK)
     except OSError as error:

@@ -11,19 +11,15 @@ from datetime import date
 from pathlib import Path
 
 from machines import DEFAULT_MACHINE
-from rigtwin.api.machines import resolve_machine
+from rigtwin.api.planning import plan_test
 from rigtwin.api.recordings import Recording, load
-from rigtwin.api.twin import Effects, Settings, effect_texts
-from rigtwin.description.changes import with_changes
-from rigtwin.description.configuration import Configuration
-from rigtwin.description.limits import require_order
+from rigtwin.api.twin import Effects, Settings
 from rigtwin.description.machine import Machine
 from rigtwin.errors import RigtwinError
 from rigtwin.files import recordable
 from rigtwin.hardware.daq import CARD
-from rigtwin.hardware.daq.table import load_table
 from rigtwin.hardware.daq.wired import InRealTime, WiredTwin
-from rigtwin.hardware.session.custom_controller import ControllerFactory, custom_controller
+from rigtwin.hardware.session.custom_controller import ControllerFactory
 from rigtwin.hardware.session.dry_run import add_dry_run
 from rigtwin.hardware.session.permission import key_of, list_obstacles, require_permission
 from rigtwin.hardware.session.record import (
@@ -35,7 +31,6 @@ from rigtwin.hardware.session.stops import stop_requests
 from rigtwin.hardware.session.test import AnyTest
 from rigtwin.hardware.supervision import SessionEnd
 from rigtwin.hardware.supervisor import COMPLETED
-from rigtwin.simulation.experiment import find_experiment
 from rigtwin.simulation.peaks import Peak
 
 PORTS = 65535
@@ -100,80 +95,6 @@ class DryRun:
     obstacles: tuple[str, ...]
 
 
-def plan_test(
-    experiment: str,
-    *,
-    machine: Machine | str | Path = DEFAULT_MACHINE,
-    card: str | Path | None = None,
-    settings: Settings = (),
-    seed: int = 0,
-    effects: Effects = (),
-    controller: ControllerFactory | None = None,
-) -> AnyTest:
-    """Return a test that is ready for supervision.
-
-    Parameters
-    ----------
-    experiment
-        Name of an experiment of the machine.
-    machine
-        Machine, its name, or the path of its description. Machines other than the suspension rig
-        may have force actuators and servos only.
-    card
-        Channel table of the card, TOML. Defaults to the shipped one of the suspension rig; other
-        machines need their own.
-    settings
-        Changes of the configuration, such as {"safety": {"force": 1200}}, or the path of a TOML
-        file, or a sequence of both.
-    seed
-        Seed of the twin's noise and of the road, at least 0.
-    effects
-        Effects added to the twin. They do not apply to the machine itself.
-    controller
-        Function of the test's configuration that returns a custom controller, see `run`. It is
-        called once for each session.
-
-    Returns
-    -------
-    AnyTest
-        The planned test.
-
-    Raises
-    ------
-    RigtwinError
-        For a mistake in any argument, or a controller that the machine cannot run.
-    """
-    if not isinstance(seed, int) or seed < 0:
-        raise RigtwinError(f"seed {seed!r:.60}: expected a whole number from 0")
-    described = resolve_machine(machine)
-    test = find_experiment(described, experiment)
-    configuration = check_settings(described, test.configuration, settings)
-    physics = described.physics
-    path = physics.card if card is None else Path(card)
-    if path is None:
-        raise RigtwinError(
-            f"{described.name}: no channel table; expected the table of the card it is wired to"
-        )
-    return physics.plan(
-        described,
-        test,
-        configuration,
-        seed,
-        load_table(path, physics.signals(described)),
-        tuple(effect_texts(effects)),
-        None if controller is None else custom_controller(controller),
-    )
-
-
-def check_settings(machine: Machine, base: Configuration, changes: Settings) -> Configuration:
-    """Return changed settings. Raises RigtwinError if no test can be run with them."""
-    configuration = with_changes(base, changes)
-    require_order(machine, configuration)
-    # Both properties raise where period and timestep do not divide the duration.
-    _ = configuration.ticks, configuration.substeps
-    return configuration
-
-
 def dry_run(
     experiment: str,
     card: str | Path,
@@ -195,19 +116,16 @@ def dry_run(
 
     Parameters
     ----------
-    experiment, machine, card, settings, seed, controller
-        Test to rehearse, see `plan_test`. With the shipped channel table nothing is noted.
-    effects
-        Effects added to the twin. With any effect nothing is noted.
+    experiment, machine, card, settings, seed, controller, effects
+        Test to rehearse, see `plan_test`. With effects, or with the shipped channel table, nothing
+        is noted.
     path
         File of the recording, MCAP.
     progress
         Function called with the number of ticks since its last call.
-    stop
+    stop, stop_file
         Function that returns a reason to end the session, or None. By default the session ends at
-        a key, or at a signal such as Ctrl-C's.
-    stop_file
-        File whose appearance ends the session, unless `stop` is given.
+        a key, at a signal such as Ctrl-C's, or when the file appears.
 
     Returns
     -------
@@ -228,19 +146,23 @@ def dry_run(
         effects=effects,
         controller=controller,
     )
-    virtual, _ = open_virtual_card(test)
     with _stopped_by(stop, stop_file) as asked:
-        ended = record_unpaced(virtual, test, Path(path), asked, progress)
+        ended = record_unpaced(open_virtual_card(test)[0], test, Path(path), asked, progress)
     # A session that ended before its test has no ticks, and cannot be loaded.
     recording = load(Path(path)) if ended.ticks else None
-    passed = ended.cause == COMPLETED
     peaks = test.predict_peaks(recording) if recording is not None else ()
-    # The shipped table arms nothing, and its folder may be read-only.
-    shipped = Path(card).resolve().parent == CARD.resolve().parent
-    if passed and not test.effects and not shipped:
-        note = {"experiment": test.experiment, "date": date.today().isoformat()}
-        add_dry_run(Path(card), key_of(test), note)
+    passed = ended.cause == COMPLETED
+    if passed and not test.effects:
+        _note_dry_run(test, Path(card))
     return DryRun(recording, ended.cause.reason, passed, peaks, list_obstacles(test))
+
+
+def _note_dry_run(test: AnyTest, card: Path) -> None:
+    """Note a passed dry run beside the channel table."""
+    # The shipped table arms nothing, and its folder may be read-only.
+    if card.resolve().parent != CARD.resolve().parent:
+        note = {"experiment": test.experiment, "date": date.today().isoformat()}
+        add_dry_run(card, key_of(test), note)
 
 
 def run_on_twin(
@@ -271,10 +193,8 @@ def run_on_twin(
         Whether the twin keeps pace with the clock. By default it runs as fast as possible.
     live
         Port of a live view for Foxglove; 0, the default, opens none.
-    progress
-        Function called with the number of ticks since its last call.
-    stop, stop_file
-        Reasons to end the test, see `dry_run`.
+    progress, stop, stop_file
+        Report of progress, and reasons to end the test, see `dry_run`.
 
     Returns
     -------
@@ -332,19 +252,13 @@ def run_on_card(
         Test to run, see `plan_test`.
     card
         Channel table of the card, calibrated and signed by an operator.
-    path
-        File of the recording, MCAP.
+    path, live, progress, stop, stop_file
+        Recording, live view, report of progress, and reasons to end the test, see `run_on_twin`.
     arm
         Function that asks the operator whether everybody is clear of the machine. It is called
         before anything moves, and nothing moves unless it returns True.
     without_dry_run
         Name of the person responsible for a test without a passed dry run. It is recorded.
-    live
-        Port of a live view for Foxglove; 0, the default, opens none.
-    progress
-        Function called with the number of ticks since its last call.
-    stop, stop_file
-        Reasons to end the test, see `dry_run`.
 
     Returns
     -------
@@ -358,16 +272,10 @@ def run_on_card(
     """
     _require_port(live)
     test = plan_test(
-        experiment,
-        machine=machine,
-        card=card,
-        settings=settings,
-        seed=seed,
-        controller=controller,
+        experiment, machine=machine, card=card, settings=settings, seed=seed, controller=controller
     )
-    # Everything that can refuse is asked before a person is: after arming, the rig moves.
     permission = require_permission(test, Path(card), without_dry_run)
-    if not arm(test):
+    if not arm(test):  # A person is asked last: after arming, the rig moves.
         return None
     with _stopped_by(stop, stop_file) as asked:
         ended = record_in_real_time(

@@ -94,7 +94,7 @@ def _needs_card(parsed: argparse.Namespace) -> bool:
 
 def _run_on_twin(parsed: argparse.Namespace, machine: Machine) -> int:
     """Runs the list on the twin of any machine."""
-    from rigtwin.api.supervised import check_settings
+    from rigtwin.api.planning import check_settings
     from rigtwin.simulation.experiment import find_experiment
 
     code = 0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 from array import array
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -114,6 +114,17 @@ class Rows:
     numbers: array[int] = field(default_factory=lambda: array("q"))
     notes: list[str] = field(default_factory=list)
 
+    def add(self, number: int, cells: Sequence[str]) -> None:
+        """Add the row of a line."""
+        self.numbers.append(number)
+        for place, builder in self.columns.items():
+            # Missing cells become empty ones, which are read as NaN, so that all columns keep one
+            # length.
+            builder.cells.append(cells[place].strip() if place < len(cells) else "")
+        if len(self.numbers) % BLOCK == 0:
+            for builder in self.columns.values():
+                builder.end_block()
+
 
 def gather_rows(
     path: Path,
@@ -151,30 +162,11 @@ def gather_rows(
         If a row has numbers beyond its last column.
     """
     rows = Rows({place: ColumnBuilder(decimal) for place in places})
-    builders = list(rows.columns.items())
     short: list[int] = []
     long: list[int] = []
     # A row is added when the next one comes, as the last one may break off.
     waiting: tuple[int, list[str]] | None = None
-
-    def add(number: int, cells: list[str]) -> None:
-        rows.numbers.append(number)
-        for place, builder in builders:
-            # Missing cells become empty ones, which are read as NaN, so that all columns keep one
-            # length.
-            builder.cells.append(cells[place].strip() if place < len(cells) else "")
-        if len(rows.numbers) % BLOCK == 0:
-            for _, builder in builders:
-                builder.end_block()
-
-    blank = separator + " \t"
-    for number, line in lines:
-        cells = raw_cells(line, separator)
-        if not line.strip(blank) or not any(map(str.strip, cells)):
-            continue
-        # Many programs end each line with a separator, which makes an empty last cell.
-        while len(cells) > wide and not cells[-1].strip():
-            cells.pop()
+    for number, cells in _split_rows(lines, separator, wide):
         if len(cells) > wide:
             # A number too many shifts all columns; a remark behind the last column harms nothing.
             if any(is_value(cell.strip(), decimal) for cell in cells[wide:]):
@@ -183,22 +175,38 @@ def gather_rows(
         elif len(cells) < wide:
             short.append(number)
         if waiting is not None:
-            add(*waiting)
+            rows.add(*waiting)
         waiting = number, cells
     if waiting is not None:
         if short and short[-1] == waiting[0]:
             rows.notes.append(f"the last line, {short.pop()}, breaks off and is left out")
         else:
-            add(*waiting)
-    if short:
-        rows.notes.append(
-            f"{len(short)} lines break off, the first is {short[0]}; cells are missing"
-        )
-    if long:
-        rows.notes.append(
-            f"{len(long)} lines have words after their last cell, the first is {long[0]}"
-        )
+            rows.add(*waiting)
+    rows.notes += _note_lengths(short, long)
     return rows
+
+
+def _note_lengths(short: Sequence[int], long: Sequence[int]) -> Iterator[str]:
+    """Yield remarks on the lines with too few and too many cells."""
+    if short:
+        yield f"{len(short)} lines break off, the first is {short[0]}; cells are missing"
+    if long:
+        yield f"{len(long)} lines have words after their last cell, the first is {long[0]}"
+
+
+def _split_rows(
+    lines: Iterable[tuple[int, str]], separator: str, wide: int
+) -> Iterator[tuple[int, list[str]]]:
+    """Yield number and cells of each line that is not blank."""
+    blank = separator + " \t"
+    for number, line in lines:
+        cells = raw_cells(line, separator)
+        if not line.strip(blank) or not any(map(str.strip, cells)):
+            continue
+        # Many programs end each line with a separator, which makes an empty last cell.
+        while len(cells) > wide and not cells[-1].strip():
+            cells.pop()
+        yield number, cells
 
 
 def raw_cells(line: str, separator: str) -> list[str]:

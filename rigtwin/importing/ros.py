@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -135,12 +135,7 @@ def _join(
         if topic is not leader and topic.series:
             join = next(iter(topic.series.values())).join
             notes.append(f"{topic.name} is {join.value} at the times of {leader.name}")
-    least = 0.0 if selection.names is not None else COMMON
-    refused = {
-        name: f"its messages cover {np.mean(np.isfinite(column)):.0%} of those of {leader.name}"
-        for name, column in values.items()
-        if np.mean(np.isfinite(column)) <= least
-    }
+    refused = _list_sparse(values, leader, 0.0 if selection.names is not None else COMMON)
     values = {name: column for name, column in values.items() if name not in refused}
     if not values:
         return Columns({}, refused=refused)
@@ -168,6 +163,15 @@ def _join(
         tuple(notes),
         refused=refused,
     )
+
+
+def _list_sparse(values: Mapping[str, Array], leader: Topic, least: float) -> dict[str, str]:
+    """Return the signals that cover at most a share of the rows, and why they are refused."""
+    return {
+        name: f"its messages cover {np.mean(np.isfinite(column)):.0%} of those of {leader.name}"
+        for name, column in values.items()
+        if np.mean(np.isfinite(column)) <= least
+    }
 
 
 def _leader(topics: Sequence[Topic], selection: Selection) -> Topic:

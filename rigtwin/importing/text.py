@@ -122,16 +122,19 @@ def read_text(path: Path, selection: Selection = EVERYTHING) -> Columns:
     form = f"text, separated by {mark}, decimal {layout.decimal}, data from line {layout.first + 1}"
     if layout.words:
         form += f"; words in {', '.join(layout.names[place] for place in sorted(layout.words))}"
-        first = split_cells(head[layout.first], layout.separator)
-        refused |= {
-            layout.names[
-                place
-            ]: f"it holds {first[place][:40]!r} in line {layout.first + 1}, which "
-            "was taken for a word; expected plain numbers, such as 1234.5, without thousands "
-            "separators, and not hexadecimal"
-            for place in layout.words
-        }
+        refused |= _refuse_words(layout, head[layout.first])
     return Columns(values, units, form, notes, wrong, listed=tuple(known), refused=refused)
+
+
+def _refuse_words(layout: Layout, line: str) -> dict[str, str]:
+    """Return the columns that hold words in the first line of data, and why they are refused."""
+    cells = split_cells(line, layout.separator)
+    return {
+        layout.names[place]: f"it holds {cells[place][:40]!r} in line {layout.first + 1}, which "
+        "was taken for a word; expected plain numbers, such as 1234.5, without thousands "
+        "separators, and not hexadecimal"
+        for place in layout.words
+    }
 
 
 def _read_columns(

@@ -85,12 +85,7 @@ def read_diagnosis(path: str | Path, look: Look) -> StartingPoint:
         If the file cannot be read, is no diagnosis, or belongs to other recordings or to another
         machine.
     """
-    try:
-        document = json.loads(Path(path).read_text())
-    except OSError as error:
-        raise RigtwinError(f"cannot read {path}: {error.strerror}") from None
-    except (ValueError, RecursionError):
-        raise RigtwinError(f"{path}: expected the JSON of rigtwin diagnose --json") from None
+    document = _read_document(path)
     try:
         machine, recordings = str(document["machine"]), [str(r) for r in document["recordings"]]
         sentence = str(document["sentence"])
@@ -127,6 +122,15 @@ def read_diagnosis(path: str | Path, look: Look) -> StartingPoint:
         tuple(effect for effect, _, _ in findings if effect not in values),
         {effect: confidence for effect, _, confidence in findings},
     )
+
+
+def _read_document(path: str | Path) -> Any:
+    try:
+        return json.loads(Path(path).read_text())
+    except OSError as error:
+        raise RigtwinError(f"cannot read {path}: {error.strerror}") from None
+    except (ValueError, RecursionError):
+        raise RigtwinError(f"{path}: expected the JSON of rigtwin diagnose --json") from None
 
 
 def _finding(entry: Mapping[str, Any]) -> tuple[str, dict[str, float], float]:

@@ -283,13 +283,6 @@ class FileContent:
         controller = {} if RECORD in doubtful else _controller(path, about)
         notes: list[str] = []
         tables = self._tables(path, notes)
-        if not tables:
-            said = (
-                f"; it ended: {metadata[END_RECORD].get('reason', '')}"
-                if END_RECORD in metadata
-                else ""
-            )
-            raise RigtwinError(f"{path} holds no ticks on {' or '.join(list_topics())}{said}")
         time, columns = _align(tables, notes)
         # Damage comes first among the notes.
         notes[:0] = _describe_damage(lost, doubtful, time)
@@ -338,6 +331,10 @@ class FileContent:
             stamps = np.array(times, np.int64)
             _check_order(path, channel.topic, stamps, notes)
             tables[channel.topic] = (stamps, values)
+        if not tables:
+            end = self._metadata.get(END_RECORD)
+            said = "" if end is None else f"; it ended: {end.get('reason', '')}"
+            raise RigtwinError(f"{path} holds no ticks on {' or '.join(list_topics())}{said}")
         return tables
 
 

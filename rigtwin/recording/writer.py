@@ -156,6 +156,17 @@ class Writer:
         self._chunks: list[ChunkIndex] = []
         self._metadata: list[MetadataIndex] = []
         # MCAP: magic bytes, header, data section, summary section, footer, magic bytes.
+        self._put_head(experiment, period, controller, machine, description)
+
+    def _put_head(
+        self,
+        experiment: str,
+        period: float,
+        controller: Mapping[str, object],
+        machine: str,
+        description: Path | None,
+    ) -> None:
+        """Write what stands before the first tick: the format, and what the test is."""
         self._put(MCAP0_MAGIC + _encode(Header(profile="", library="rigtwin")))
         # The controller's settings are what its operator knows; hidden effects are not stored here.
         config = json.dumps({"controller": controller})
@@ -167,7 +178,7 @@ class Writer:
                 "experiment": experiment,
                 "period": repr(period),
                 "config": config,
-                **description_values(path, description),
+                **description_values(self._path, description),
             },
         )
 

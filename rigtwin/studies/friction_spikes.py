@@ -287,29 +287,12 @@ def find_compensator(recording: Recording, settings: Settings, seed: int = 0) ->
     """
     _check_recording(recording, settings)
     period = recording.period
-    turns, directions, crowded = reversals(recording)
     window = round(WINDOW / period)
-    # A reversal too close to either end has no complete window.
-    inside = (turns > window) & (turns < recording.ticks - 3 * window)
-    turns, directions = turns[inside], directions[inside]
-    if len(turns) < MIN_REVERSALS:
-        raise RigtwinError(
-            f"{recording.path}: the motor reverses {len(turns)} times; "
-            f"expected at least {MIN_REVERSALS}",
-        )
+    turns, directions, crowded = _list_complete_reversals(recording, window)
     ticks, coulomb = _measure_jumps(recording, turns, directions, window)
     cell = recording.column("/sensor", "load_cell")
     errors = recording.column("/command", "force") - filter_lag(cell, settings.filter_force, period)
-    # Before a reversal the error is the steady tracking error; friction causes the rise above it.
-    # The last quarter of the window is left out, because the tick of the jump is only known
-    # roughly.
-    steady = directions * np.array(
-        [np.mean(errors[tick - window : tick - window // 4]) for tick in ticks],
-    )
-    # The sign makes all reversals look alike: the error then rises.
-    pairs = zip(ticks, directions, strict=True)
-    rises = np.array([way * errors[tick : tick + 2 * window] for tick, way in pairs])
-    envelope = np.mean(rises - steady[:, None], axis=0)
+    envelope = _average_rises(errors, ticks, directions, window)
     friction = coulomb * _directions(recording.ticks, ticks, directions, crowded)
     # A reversal turns friction from -F to +F, so the compensating step is 2 F.
     base = settings._replace(compensator=Compensator.ONE_STEP, friction_step=2 * coulomb)
@@ -336,6 +319,35 @@ def find_compensator(recording: Recording, settings: Settings, seed: int = 0) ->
         false=false,
         delay=delay,
     )
+
+
+def _list_complete_reversals(
+    recording: Recording, window: int
+) -> tuple[NDArray[np.intp], Array, NDArray[np.intp]]:
+    """Return the reversals with a complete window about them, as `reversals` does."""
+    turns, directions, crowded = reversals(recording)
+    inside = (turns > window) & (turns < recording.ticks - 3 * window)
+    turns, directions = turns[inside], directions[inside]
+    if len(turns) < MIN_REVERSALS:
+        raise RigtwinError(
+            f"{recording.path}: the motor reverses {len(turns)} times; "
+            f"expected at least {MIN_REVERSALS}",
+        )
+    return turns, directions, crowded
+
+
+def _average_rises(errors: Array, ticks: NDArray[np.intp], directions: Array, window: int) -> Array:
+    """Return the mean rise of the force error after a reversal, in N, shape (2 · window,)."""
+    # Before a reversal the error is the steady tracking error; friction causes the rise above it.
+    # The last quarter of the window is left out, because the tick of the jump is only known
+    # roughly.
+    steady = directions * np.array(
+        [np.mean(errors[tick - window : tick - window // 4]) for tick in ticks],
+    )
+    # The sign makes all reversals look alike: the error then rises.
+    pairs = zip(ticks, directions, strict=True)
+    rises = np.array([way * errors[tick : tick + 2 * window] for tick, way in pairs])
+    return np.mean(rises - steady[:, None], axis=0)
 
 
 def _search_settings(base: Settings, test: _Test, seed: int) -> Settings:

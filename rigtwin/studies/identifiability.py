@@ -122,13 +122,26 @@ def find_identifiable(
             progress(f"{effect.name}, {number} of {len(searched)}")
             responses[effect.name] = trial.response(effect)
     except _OutOfTime:
-        untried = tuple(each.name for each in searched if each.name not in responses)
+        left = tuple(effect.name for effect in searched if effect.name not in responses)
         unseen = tuple(name for name, shape in responses.items() if shape is None)
         seen = tuple(name for name, shape in responses.items() if shape is not None)
-        return Identifiability((), unseen, {}, motions, sums, (*seen, *untried))
+        return Identifiability((), unseen, {}, motions, sums, (*seen, *left))
     unseen = tuple(name for name, shape in responses.items() if shape is None)
     shapes = {name: shape for name, shape in responses.items() if shape is not None}
-    effects = {each.name: each for each in searched if each.name in shapes}
+    effects = {effect.name: effect for effect in searched if effect.name in shapes}
+    confounded, untried = _find_confounded(trial, effects, shapes, progress)
+    known = {*unseen, *confounded, *untried}
+    seen = tuple(name for name in responses if name not in known)
+    return Identifiability(seen, unseen, confounded, motions, sums, untried)
+
+
+def _find_confounded(
+    trial: _Trial,
+    effects: Mapping[str, Effect],
+    shapes: Mapping[str, Array],
+    progress: Callable[[str], object],
+) -> tuple[dict[str, tuple[str, ...]], tuple[str, ...]]:
+    """Return the combination that reproduces each confounded effect, and the effects untried."""
     confounded: dict[str, tuple[str, ...]] = {}
     untried: tuple[str, ...] = ()
     for number, (name, shape) in enumerate(shapes.items(), 1):
@@ -141,9 +154,7 @@ def find_identifiable(
                     break
         except _OutOfTime:
             untried = (*untried, name)
-    known = {*unseen, *confounded, *untried}
-    seen = tuple(name for name in responses if name not in known)
-    return Identifiability(seen, unseen, confounded, motions, sums, untried)
+    return confounded, untried
 
 
 class _Trial:

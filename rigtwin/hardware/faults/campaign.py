@@ -220,28 +220,15 @@ def try_fault(
         If a real operator ended the campaign.
     """
     test = replace(plan_test(fault, experiment, table), controller=controller)
-    period, name = test.configuration.timing.period, fault.kind.name
-    bench = FaultyBench(
-        test.terminals(),
-        table,
-        kind=name,
-        at=fault.at,
-        place=fault.place,
-        seed=fault.seed,
-        ticks=count_card_ticks(test),
-    )
-    virtual = _GlitchingCard(bench, table, OnDemand())
-    if fault.kind.place == "card":
-        virtual.glitch = (name, fault.at)
-    # Time is the virtual card's, so results do not depend on this computer's speed.
-    card = Card(table, period, InProcess(virtual), clock=lambda: virtual.tick * period)
+    bench, virtual, card = _open_faulty_card(fault, test)
     path, stop_file = folder / f"{fault.seed}.mcap", folder / f"{fault.seed}.stop"
     interrupted: list[str] = []
     with _full_disk(path) as fill, stop_requests(stop_file) as find_request:
         stop = _make_stop(fault, virtual, stop_file, fill, find_request, interrupted)
 
         def show_full_disk(_: int) -> None:
-            if name == "full disk" and virtual.tick >= fault.at and bench.shown < 0:
+            full = fault.kind.name == "full disk" and virtual.tick >= fault.at
+            if full and bench.shown < 0:
                 bench.shown = virtual.tick
 
         updating = test.updating()
@@ -257,6 +244,26 @@ def try_fault(
     if interrupted:
         raise KeyboardInterrupt(interrupted[0])
     return judge(fault, test, bench, path)
+
+
+def _open_faulty_card(fault: InjectedFault, test: Test) -> tuple[FaultyBench, _GlitchingCard, Card]:
+    """Return a rig with the fault, the virtual card in front of it, and the client's card."""
+    period = test.configuration.timing.period
+    bench = FaultyBench(
+        test.terminals(),
+        test.table,
+        kind=fault.kind.name,
+        at=fault.at,
+        place=fault.place,
+        seed=fault.seed,
+        ticks=count_card_ticks(test),
+    )
+    virtual = _GlitchingCard(bench, test.table, OnDemand())
+    if fault.kind.place == "card":
+        virtual.glitch = (fault.kind.name, fault.at)
+    # Time is the virtual card's, so results do not depend on this computer's speed.
+    card = Card(test.table, period, InProcess(virtual), clock=lambda: virtual.tick * period)
+    return bench, virtual, card
 
 
 def _make_stop(

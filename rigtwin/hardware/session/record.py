@@ -217,10 +217,7 @@ def record_in_real_time(
         If the session cannot begin; nothing has moved then.
     """
     operation = test.operation()
-    course = operation.course
-    # Upper bound on the ticks, with a second to spare: the statistics' memory must not grow later.
-    whole = operation.ticks + round(2.0 * (course.ramp + course.hold + 1.0) / operation.period)
-    lateness = Lateness(whole)
+    lateness = Lateness(_count_ticks(operation))
     # The guardian starts before this process takes real-time priority, which it would inherit.
     guardian = Guardian(guardian_settings(test, path, guarded, notes, live))
     with ExitStack() as stack:
@@ -234,6 +231,13 @@ def record_in_real_time(
     guardian.add_metadata(LATENESS_RECORD, lateness.record(describe_grants(grants)))
     guardian.finish(ended.cause.reason)
     return ended
+
+
+def _count_ticks(operation: Operation) -> int:
+    """Return an upper bound on a session's ticks: the statistics' memory must not grow later."""
+    course = operation.course
+    # Both ramps and the hold, with a second to spare.
+    return operation.ticks + round(2.0 * (course.ramp + course.hold + 1.0) / operation.period)
 
 
 def open_card(test: AnyTest) -> Card:
