@@ -172,6 +172,10 @@ class _TestSeries:
             worst = max(worst, test.criteria.j2 if test.stable else WORST)
         return worst
 
+    def criterion(self, law: Law) -> float:
+        """Return what the search minimises, %."""
+        return self.worst_tracking(law) + self.noise_response(law)
+
     def noise_response(self, law: Law) -> float:
         """Return J2 with noise on the nominal plant, above that of the noise alone, %."""
         test = run_test(self._case, self._ground, law, noise=BENCHMARK)
@@ -238,14 +242,11 @@ def tune_compensator(
     ----------
     name : str
         Compensator, one of `TUNABLE`.
-    case : int
-        Case of the building, 1 to 4. Defaults to 4.
-    quake : str
-        Earthquake: elcentro, kobe or morgan. Defaults to elcentro.
-    plants : int
-        Number of plants in the criterion, the nominal one included, 1 to 1000. Defaults to 8.
-    held_out_plants : int
-        Number of plants for the validation, 1 to 1000. Defaults to 12.
+    case, quake : int, str
+        Case of the building, 1 to 4, and earthquake: elcentro, kobe or morgan.
+    plants, held_out_plants : int
+        Numbers of plants in the criterion, the nominal one included, and in the validation, 1 to
+        1000.
     evaluations : int
         Largest number of evaluations of the criterion, 3 to 1000. Defaults to 60.
     seed : int
@@ -271,9 +272,8 @@ def tune_compensator(
     validation = _TestSeries(building, ground, drawn[plants:])
 
     def objective(point: np.ndarray) -> float:
-        law = tunable.make(**tunable.values(point))
         progress(1)
-        return tuning.worst_tracking(law) + tuning.noise_response(law)
+        return tuning.criterion(tunable.make(**tunable.values(point)))
 
     (start, first), (best, last) = _improve(objective, tunable.start(), evaluations)
     initial, tuned = tunable.values(start), tunable.values(best)
