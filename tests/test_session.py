@@ -31,7 +31,7 @@ from rigtwin.hardware.daq.calibration import (
     set_spans,
     set_zeros,
 )
-from rigtwin.hardware.daq.table import load_table, to_toml
+from rigtwin.hardware.daq.table_file import load_table, to_toml
 from rigtwin.hardware.daq.terminals import Terminals
 from rigtwin.hardware.daq.wired import InRealTime, WiredTwin
 from rigtwin.hardware.realtime import Pacer, in_real_time, list_shortcomings, sleep_until

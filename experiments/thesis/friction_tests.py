@@ -34,13 +34,8 @@ from rigtwin.signals.excitation import fade_in
 from rigtwin.signals.noise import rms
 from rigtwin.simulation.runner import record, simulate
 from rigtwin.simulation.twin import Twin
-from rigtwin.studies.friction_spikes import (
-    BOUNDS,
-    Calibration,
-    detections,
-    filter_lag,
-    find_compensator,
-)
+from rigtwin.studies.friction_loop import detections, filter_lag
+from rigtwin.studies.friction_spikes import BOUNDS, Calibration, find_compensator
 
 LOOPS: dict[str, dict[str, float]] = {
     "fitted": {"kp": 1.0, "ki": 190.0},

@@ -23,7 +23,7 @@ from rigtwin.numerics.arrays import Array
 from rigtwin.render.plot import ASKED, SENSED
 from rigtwin.signals.excitation import schroeder
 from rigtwin.simulation.runner import simulate
-from rigtwin.studies.friction_spikes import filter_lag
+from rigtwin.studies.friction_loop import filter_lag
 
 Response = NDArray[np.complex128]
 

@@ -27,9 +27,10 @@ from rigtwin.hardware.daq.calibration import (
     set_zeros,
     sign_off,
 )
-from rigtwin.hardware.daq.card import require_client
+from rigtwin.hardware.daq.driver import require_client
 from rigtwin.hardware.daq.failsafe import release
-from rigtwin.hardware.daq.table import OUTPUTS, ChannelTable, load_table, require_ranges, to_toml
+from rigtwin.hardware.daq.table import OUTPUTS, ChannelTable, require_ranges
+from rigtwin.hardware.daq.table_file import load_table, to_toml
 from rigtwin.hardware.daq.virtual import RealTime, VirtualCard
 from rigtwin.hardware.session.stops import stop_requests
 from rigtwin.hardware.session.table_check import (

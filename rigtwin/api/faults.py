@@ -13,10 +13,12 @@ from rigtwin.description.changes import with_changes
 from rigtwin.description.control import set_up
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq import CARD
-from rigtwin.hardware.daq.card import require_client
-from rigtwin.hardware.daq.table import ChannelTable, load_table
-from rigtwin.hardware.faults.campaign import FaultResult, InjectedFault, draw_faults, try_fault
+from rigtwin.hardware.daq.driver import require_client
+from rigtwin.hardware.daq.table import ChannelTable
+from rigtwin.hardware.daq.table_file import load_table
+from rigtwin.hardware.faults.campaign import draw_faults, try_fault
 from rigtwin.hardware.faults.kinds import KINDS
+from rigtwin.hardware.faults.outcome import FaultResult, InjectedFault
 from rigtwin.hardware.faults.processes import try_process_fault
 from rigtwin.hardware.session.custom_controller import (
     ControllerFactory,

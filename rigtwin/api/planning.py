@@ -12,7 +12,8 @@ from rigtwin.description.configuration import Configuration
 from rigtwin.description.limits import require_order
 from rigtwin.description.machine import Machine
 from rigtwin.errors import RigtwinError
-from rigtwin.hardware.daq.table import ChannelTable, load_table
+from rigtwin.hardware.daq.table import ChannelTable
+from rigtwin.hardware.daq.table_file import load_table
 from rigtwin.hardware.session.custom_controller import ControllerFactory, custom_controller
 from rigtwin.hardware.session.test import AnyTest
 from rigtwin.simulation.experiment import find_experiment

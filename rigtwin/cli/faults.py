@@ -16,8 +16,8 @@ from rigtwin.files import atomic_write
 from rigtwin.hardware.daq import CARD
 
 if TYPE_CHECKING:
-    from rigtwin.hardware.faults.campaign import FaultResult
     from rigtwin.hardware.faults.kinds import FaultKind
+    from rigtwin.hardware.faults.outcome import FaultResult
 
 SUMMARY = "put faults into sessions on the virtual card; see that each is stopped"
 MORE = "docs/faults.md"

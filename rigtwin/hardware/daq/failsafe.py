@@ -8,15 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from rigtwin.hardware.daq.card import (
-    INPUTS,
-    OUTPUTS,
-    PRESSURE,
-    CardFault,
-    connect,
-    translate_errors,
-)
+from rigtwin.hardware.daq.card import INPUTS, OUTPUTS, PRESSURE
 from rigtwin.hardware.daq.conversion import conversion, to_volts
+from rigtwin.hardware.daq.driver import CardFault, connect, translate_errors
 from rigtwin.hardware.daq.table import ChannelTable
 from rigtwin.numerics.arrays import Array
 

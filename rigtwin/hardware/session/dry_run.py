@@ -9,7 +9,8 @@ from pathlib import Path
 
 from rigtwin.description.configuration import Configuration, flatten
 from rigtwin.errors import RigtwinError
-from rigtwin.hardware.daq.table import ChannelTable, to_toml
+from rigtwin.hardware.daq.table import ChannelTable
+from rigtwin.hardware.daq.table_file import to_toml
 
 
 def digest(title: str, configuration: Configuration, demands: bytes, table: ChannelTable) -> str:

@@ -9,8 +9,9 @@ from pathlib import Path
 
 from rigtwin import __version__
 from rigtwin.description.configuration import flatten
-from rigtwin.hardware.daq.card import Card, connect, require_client
-from rigtwin.hardware.daq.table import to_toml
+from rigtwin.hardware.daq.card import Card
+from rigtwin.hardware.daq.driver import connect, require_client
+from rigtwin.hardware.daq.table_file import to_toml
 from rigtwin.hardware.daq.virtual import OnDemand, VirtualCard
 from rigtwin.hardware.daq.wired import Wired
 from rigtwin.hardware.operation import Operation

@@ -18,7 +18,8 @@ from rigtwin.hardware.daq.calibration import (
     measure_rest,
     plan_bumps,
 )
-from rigtwin.hardware.daq.card import Card, connect, require_client
+from rigtwin.hardware.daq.card import Card
+from rigtwin.hardware.daq.driver import connect, require_client
 from rigtwin.hardware.daq.table import OUTPUTS, ChannelTable, Plausible
 from rigtwin.hardware.daq.terminals import Terminals
 from rigtwin.hardware.daq.virtual import OnDemand, VirtualCard
