@@ -20,6 +20,7 @@ from machines import DEFAULT_MACHINE
 from rigtwin.errors import RigtwinError
 from rigtwin.files import printable
 from rigtwin.numerics.arrays import Array
+from rigtwin.recording.alignment import align, check_order, check_times
 from rigtwin.recording.columns import decode_columns
 from rigtwin.recording.description_path import description_of
 from rigtwin.recording.inputs import Inputs
@@ -36,10 +37,6 @@ from rigtwin.recording.schema import (
 
 if TYPE_CHECKING:
     import pandas
-
-WRONG_PERIOD, DOUBTFUL_PERIOD = 0.02, 1e-3
-"""Shares by which the spacing of time stamps may differ from the declared period: above the first a
-recording is refused, above the second it has a note."""
 
 
 @dataclass(frozen=True)
@@ -283,7 +280,7 @@ class FileContent:
         controller = {} if RECORD in doubtful else _controller(path, about)
         notes: list[str] = []
         tables = self._tables(path, notes)
-        time, columns = _align(tables, notes)
+        time, columns = align(tables, notes)
         # Damage comes first among the notes.
         notes[:0] = _describe_damage(lost, doubtful, time)
         if not len(time):
@@ -291,7 +288,7 @@ class FileContent:
                 f"{path}: {' and '.join(tables)} have no tick in common; "
                 "expected the same times on each"
             )
-        _check_times(path, time, period, notes)
+        check_times(path, time, period, notes)
         return Recording(
             path=path,
             machine=printable(about.get("machine", DEFAULT_MACHINE)),
@@ -329,7 +326,7 @@ class FileContent:
             # Times stay in whole nanoseconds until topics are aligned: doubles would not compare
             # equal.
             stamps = np.array(times, np.int64)
-            _check_order(path, channel.topic, stamps, notes)
+            check_order(path, channel.topic, stamps, notes)
             tables[channel.topic] = (stamps, values)
         if not tables:
             end = self._metadata.get(END_RECORD)
@@ -442,70 +439,3 @@ def _controller(path: Path, about: Mapping[str, str]) -> Mapping[str, object]:
         printable(name): printable(value) if isinstance(value, str) else value
         for name, value in controller.items()
     }
-
-
-def _check_order(path: Path, topic: str, stamps: NDArray[np.int64], notes: list[str]) -> None:
-    """Note messages that are out of order. Raise RigtwinError if most of them are."""
-    falls = int(np.sum(np.diff(stamps) < 0))
-    # A few messages out of order are normal for several writers; a reversed clock is not.
-    if 2 * falls > len(stamps) - 1:
-        raise RigtwinError(
-            f"{path}: time on {topic} runs backwards, from {stamps[0] * 1e-9:.3f} s to "
-            f"{stamps[-1] * 1e-9:.3f} s; expected rising times"
-        )
-    if falls:
-        notes.append(f"{falls} messages on {topic} come after later ones; sorted by time")
-
-
-def _align(
-    tables: Mapping[str, tuple[NDArray[np.int64], dict[str, Array]]], notes: list[str]
-) -> tuple[Array, dict[str, dict[str, Array]]]:
-    """Return the ticks that all topics have in common, in order."""
-    first, *rest = (times for times, _ in tables.values())
-    # Nearly always all topics have the same ascending times, and nothing needs to be sorted.
-    if (np.diff(first) > 0).all() and all(np.array_equal(first, times) for times in rest):
-        return first * 1e-9, {topic: dict(values) for topic, (_, values) in tables.items()}
-    # np.unique also sorts, and drops repeated times, of which the first message counts.
-    common = np.unique(first)
-    for times in rest:
-        common = np.intersect1d(common, times)
-    columns: dict[str, dict[str, Array]] = {}
-    for topic, (times, values) in tables.items():
-        _, first = np.unique(times, return_index=True)
-        # `first` are places of sorted unique times, so `keep` is in order of time, not of the
-        # file.
-        keep = first[np.isin(times[first], common)]
-        if len(keep) < len(times):
-            notes.append(
-                f"{len(times) - len(keep)} messages on {topic} left out: repeated, "
-                "or without their like on another topic"
-            )
-        columns[topic] = {name: column[keep] for name, column in values.items()}
-    return common * 1e-9, columns
-
-
-def _check_times(path: Path, time: Array, period: float, notes: list[str]) -> None:
-    """Note gaps in time. Raise RigtwinError if the period differs from the recorded one."""
-    steps = np.diff(time)
-    # Stamps may be rounded: their mean says more than any of them, gaps apart.
-    typical = float(np.median(steps)) if len(steps) else period
-    regular = steps[steps < 1.5 * max(typical, period)]
-    spacing = float(np.mean(regular)) if len(regular) else typical
-    off = abs(spacing - period) / period
-    if off > WRONG_PERIOD:
-        raise RigtwinError(
-            f"{path}: its period is said to be {period:g} s, but messages come every "
-            f"{spacing:.4g} s; expected time stamps within {100 * WRONG_PERIOD:g} % of the period"
-        )
-    if off > DOUBTFUL_PERIOD:
-        notes.append(
-            f"messages come every {spacing:.6g} s, {100.0 * off:.2g} % off the period of "
-            f"{period:g} s, which is what ticks are taken for"
-        )
-    # Half a period separates jitter of the stamps from a tick that is missing.
-    gaps = np.nonzero(np.abs(np.diff(time) - period) > 0.5 * period)[0]
-    if len(gaps):
-        notes.append(
-            f"{len(gaps)} gaps in time, "
-            f"the first of {np.diff(time)[gaps[0]]:.4g} s at {time[gaps[0]]:.3f} s"
-        )
