@@ -23,7 +23,7 @@ from controllers import (
 from controllers.force import MOTOR_CONSTANT
 from experiments import find
 from experiments.experiment import time_of
-from experiments.thesis.identification import thesis_cylinder
+from experiments.thesis.actuator_tests import thesis_cylinder
 from experiments.thesis.study import Result
 from experiments.thesis.trial import ThesisTrial, trial
 from rigtwin.description.configuration import Configuration
