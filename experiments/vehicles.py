@@ -74,11 +74,7 @@ def _tests() -> Iterator[Experiment]:
     for name, vehicle in VEHICLES.items():
         dropped = configuration(vehicle)
         yield Experiment(
-            name,
-            f"{name} dropped: unstable on this rig",
-            "thesis Table 6.1",
-            dropped,
-            flat_ground,
+            name, f"{name} dropped: unstable on this rig", "thesis Table 6.1", dropped, flat_ground
         )
         yield Experiment(
             f"{name}-road10",

@@ -176,10 +176,5 @@ def _summarise(result: Result) -> str:
 
 
 STUDY = ThesisStudy(
-    "rths",
-    "The benchmark of real-time hybrid simulation",
-    "RTHS",
-    (),
-    _conclude,
-    _jobs,
+    "rths", "The benchmark of real-time hybrid simulation", "RTHS", (), _conclude, _jobs
 )

@@ -209,10 +209,7 @@ def _a1_3_slow() -> LocusCase:
             judges.becomes_unstable(BODY, WHEEL),
         ),
         claim(
-            "A1.15",
-            "high ratios",
-            "vertical asymptote of the wheel hop",
-            shapes.asymptote("start"),
+            "A1.15", "high ratios", "vertical asymptote of the wheel hop", shapes.asymptote("start")
         ),
         claim("A1.16", "resemblance", "not well at any damping ratio", resemblance.never_resembles),
     )

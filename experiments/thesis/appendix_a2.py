@@ -165,10 +165,7 @@ def _a2_3_quick() -> LocusCase:
         ),
         claim("A2.12", "high ratios", "no asymptote of the wheel hop", shapes.pairs_at_start(1, 1)),
         claim(
-            "A2.12",
-            "low ratios",
-            "wheel hop matches the ideal",
-            resemblance.wheel_resembles("end"),
+            "A2.12", "low ratios", "wheel hop matches the ideal", resemblance.wheel_resembles("end")
         ),
     )
 

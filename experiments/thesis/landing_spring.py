@@ -148,12 +148,7 @@ def _spring_stiffness(
             differs,
         ),
         digits(
-            where,
-            f"equilibrium over stroke, {words}",
-            "76",
-            100.0 * at_rest / travel,
-            "%",
-            differs,
+            where, f"equilibrium over stroke, {words}", "76", 100.0 * at_rest / travel, "%", differs
         ),
     ]
 

@@ -11,18 +11,9 @@ from experiments.thesis.entry import Entry, statement
 from experiments.thesis.landing import Landing, touch_down
 from experiments.thesis.study import Drawing, sheet
 from rigtwin.components import Cylinder
-from rigtwin.components.gas_spring import (
-    equilibrium,
-    find_charge,
-    stiffness,
-)
+from rigtwin.components.gas_spring import equilibrium, find_charge, stiffness
 from rigtwin.numerics.arrays import Array
-from rigtwin.studies.similitude import (
-    Scaling,
-    scale_values,
-    scaling,
-    slow_down,
-)
+from rigtwin.studies.similitude import Scaling, scale_values, scaling, slow_down
 
 BOEING = Landing()
 UNITS = {

@@ -23,12 +23,7 @@ from experiments.thesis.scaled_landing import (
 )
 from experiments.thesis.study import Conclusion, Result, ThesisStudy
 from experiments.vehicles import VEHICLES, configuration
-from rigtwin.studies.similitude import (
-    largest_change,
-    pi_groups,
-    scale_values,
-    scaling,
-)
+from rigtwin.studies.similitude import largest_change, pi_groups, scale_values, scaling
 
 UNITS |= {"stroke": "m", "time": "s"}
 

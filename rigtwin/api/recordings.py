@@ -77,12 +77,7 @@ class Recording(reader.Recording):
         return Path(out)
 
     def video(
-        self,
-        out: str | Path,
-        *,
-        ghost: float = 0.0,
-        settings: Settings = (),
-        **options: Any,
+        self, out: str | Path, *, ghost: float = 0.0, settings: Settings = (), **options: Any
     ) -> Path:
         """Film the machine in motion, with its signals beneath.
 

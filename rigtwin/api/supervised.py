@@ -22,11 +22,7 @@ from rigtwin.hardware.daq.wired import InRealTime, WiredTwin
 from rigtwin.hardware.session.custom_controller import ControllerFactory
 from rigtwin.hardware.session.dry_run import add_dry_run
 from rigtwin.hardware.session.permission import key_of, list_obstacles, require_permission
-from rigtwin.hardware.session.record import (
-    open_virtual_card,
-    record_in_real_time,
-    record_unpaced,
-)
+from rigtwin.hardware.session.record import open_virtual_card, record_in_real_time, record_unpaced
 from rigtwin.hardware.session.stops import stop_requests
 from rigtwin.hardware.session.test import AnyTest
 from rigtwin.hardware.supervision import SessionEnd

@@ -43,9 +43,7 @@ def add_effect(parser: argparse.ArgumentParser, summary: str) -> None:
 
 
 def add_machine(
-    parser: argparse.ArgumentParser,
-    what: str = "the machine",
-    default: str | None = None,
+    parser: argparse.ArgumentParser, what: str = "the machine", default: str | None = None
 ) -> None:
     parser.add_argument(
         "--machine",
@@ -115,9 +113,7 @@ def add_workers(parser: argparse.ArgumentParser) -> None:
         help="processes that work side by side (default: one a core)",
     )
     parser.add_argument(
-        "--cluster",
-        metavar="ADDRESS",
-        help="work on a dask cluster instead, e.g. tcp://host:8786",
+        "--cluster", metavar="ADDRESS", help="work on a dask cluster instead, e.g. tcp://host:8786"
     )
 
 

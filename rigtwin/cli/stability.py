@@ -59,9 +59,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="draw stability over two parameters, e.g. sprung_mass tau",
     )
     parser.add_argument(
-        "--model",
-        metavar="NAME",
-        help=f"of the map: one of those in the table (default {DRAWN})",
+        "--model", metavar="NAME", help=f"of the map: one of those in the table (default {DRAWN})"
     )
     parser.add_argument(
         "--out",

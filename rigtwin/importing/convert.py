@@ -48,10 +48,7 @@ class Written:
 
 
 def convert(
-    data: Data,
-    mapping: Path | Mapping[str, Any],
-    out: Path,
-    machine: Machine | None = None,
+    data: Data, mapping: Path | Mapping[str, Any], out: Path, machine: Machine | None = None
 ) -> list[str]:
     """Convert another program's data to a recording.
 
@@ -84,10 +81,7 @@ def convert(
 
 
 def convert_episodes(
-    data: Data,
-    mapping: Path | Mapping[str, Any],
-    folder: Path,
-    machine: Machine | None = None,
+    data: Data, mapping: Path | Mapping[str, Any], folder: Path, machine: Machine | None = None
 ) -> tuple[Written, ...]:
     """Convert each episode of another program's data to a recording.
 

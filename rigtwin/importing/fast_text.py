@@ -91,9 +91,7 @@ def _read_blocks(
     reader = csv.open_csv(
         file,
         csv.ReadOptions(
-            use_threads=False,
-            block_size=BLOCK,
-            column_names=[str(place) for place in range(wide)],
+            use_threads=False, block_size=BLOCK, column_names=[str(place) for place in range(wide)]
         ),
         csv.ParseOptions(delimiter=separator, invalid_row_handler=refuse),
         csv.ConvertOptions(

@@ -109,7 +109,5 @@ class Map:
         """Columns and episodes that the map needs of a file."""
         names = {column.name for column in self.inputs.values()} | {*self.time}
         return Selection(
-            frozenset(names | ({self.episode} if self.episode else set())),
-            self.time,
-            self.episodes,
+            frozenset(names | ({self.episode} if self.episode else set())), self.time, self.episodes
         )

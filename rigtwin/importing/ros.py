@@ -105,12 +105,7 @@ def _read(path: Path, reader: Reader, selection: Selection) -> Columns:
     return replace(joined, listed=tuple(listed), refused={**refused, **joined.refused})
 
 
-def _join(
-    path: Path,
-    topics: Sequence[Topic],
-    selection: Selection,
-    clock: str,
-) -> Columns:
+def _join(path: Path, topics: Sequence[Topic], selection: Selection, clock: str) -> Columns:
     """Join the topics on the times of one of them, the column `clock`."""
     leader = _leader(topics, selection)
     notes = [

@@ -9,13 +9,7 @@ from functools import partial
 from statistics import median_low
 from typing import TYPE_CHECKING, Any
 
-from rigtwin.importing.ros_messages import (
-    MEASURED,
-    TRAJECTORY,
-    list_numbers,
-    list_points,
-    stamp_of,
-)
+from rigtwin.importing.ros_messages import MEASURED, TRAJECTORY, list_numbers, list_points, stamp_of
 from rigtwin.importing.series import Join, Series
 
 if TYPE_CHECKING:

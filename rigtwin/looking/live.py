@@ -133,11 +133,7 @@ class LivePage:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _follow(
-        self,
-        follow: Follow,
-        look_back: Callable[[LocalServer, Watch], Page],
-    ) -> None:
+    def _follow(self, follow: Follow, look_back: Callable[[LocalServer, Watch], Page]) -> None:
         """Watch the test, then replace the page by a look at the recording."""
         try:
             watch, ended = self._watch_to_its_end(follow)

@@ -54,11 +54,7 @@ class ForceTest(NamedTuple):
 
 @kernel
 def close_loop(
-    settings: Settings,
-    compensated: bool,
-    test: ForceTest,
-    errors: Array,
-    steps: Array,
+    settings: Settings, compensated: bool, test: ForceTest, errors: Array, steps: Array
 ) -> float:
     """Simulate the force loop under friction, with or without the compensator.
 
@@ -119,11 +115,7 @@ def filter_lag(samples: Array, time_constant: float, period: float) -> Array:
 
 
 def detections(
-    settings: Settings,
-    travels: Array,
-    demanded: Array,
-    cells: Array,
-    period: float,
+    settings: Settings, travels: Array, demanded: Array, cells: Array, period: float
 ) -> Array:
     """Return the direction of the compensator's step at each tick, or 0, as if none were applied.
 

@@ -187,11 +187,7 @@ def _check_recording(recording: Recording, settings: Settings) -> None:
 
 
 def _match_steps(
-    steps: Array,
-    turns: NDArray[np.intp],
-    directions: Array,
-    within: int,
-    crowded: NDArray[np.intp],
+    steps: Array, turns: NDArray[np.intp], directions: Array, within: int, crowded: NDArray[np.intp]
 ) -> tuple[list[int], int]:
     """Return the ticks from each detected reversal to its detection, and the number of false steps.
 

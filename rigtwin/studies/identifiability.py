@@ -81,9 +81,7 @@ class _OutOfTime(Exception):
 
 
 def find_identifiable(
-    machine: Machine,
-    seconds: float = math.inf,
-    progress: Callable[[str], object] = lambda _: None,
+    machine: Machine, seconds: float = math.inf, progress: Callable[[str], object] = lambda _: None
 ) -> Identifiability:
     """Return which effects of a machine its sensors can identify.
 

@@ -45,8 +45,7 @@ def reversals(recording: Recording) -> tuple[NDArray[np.intp], Array, NDArray[np
 
     travel = _without_hum(recording.column("/sensor", "suspension_lvdt"), recording.time)
     velocity = np.gradient(
-        gaussian_filter1d(travel, SMOOTHING / recording.period),
-        recording.period,
+        gaussian_filter1d(travel, SMOOTHING / recording.period), recording.period
     )
     crossings = np.flatnonzero(np.diff(np.sign(velocity)) != 0)
     gap = SEPARATION / recording.period
@@ -69,7 +68,7 @@ def list_complete_reversals(
     if len(turns) < MIN_REVERSALS:
         raise RigtwinError(
             f"{recording.path}: the motor reverses {len(turns)} times; "
-            f"expected at least {MIN_REVERSALS}",
+            f"expected at least {MIN_REVERSALS}"
         )
     return turns, directions, crowded
 
@@ -80,7 +79,7 @@ def average_rises(errors: Array, ticks: NDArray[np.intp], directions: Array, win
     # The last quarter of the window is left out, because the tick of the jump is only known
     # roughly.
     steady = directions * np.array(
-        [np.mean(errors[tick - window : tick - window // 4]) for tick in ticks],
+        [np.mean(errors[tick - window : tick - window // 4]) for tick in ticks]
     )
     # The sign makes all reversals look alike: the error then rises.
     pairs = zip(ticks, directions, strict=True)
@@ -112,10 +111,7 @@ def measure_jumps(
 
 
 def list_directions(
-    count: int,
-    ticks: NDArray[np.intp],
-    directions: Array,
-    crowded: NDArray[np.intp],
+    count: int, ticks: NDArray[np.intp], directions: Array, crowded: NDArray[np.intp]
 ) -> Array:
     """Return the direction of motion at each tick, which changes at every reversal."""
     way = np.empty(count)

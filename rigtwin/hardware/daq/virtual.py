@@ -123,12 +123,7 @@ class VirtualCard:
         State of the digital line.
     """
 
-    def __init__(
-        self,
-        terminals: Wired,
-        wiring: ChannelTable,
-        time: OnDemand | RealTime,
-    ) -> None:
+    def __init__(self, terminals: Wired, wiring: ChannelTable, time: OnDemand | RealTime) -> None:
         self._terminals, self._time, self._device = terminals, time, wiring.device
         self._inputs, self._outputs = (
             [line.line for line in wiring.inputs],

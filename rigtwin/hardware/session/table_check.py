@@ -85,10 +85,7 @@ def look_at_rest(table: ChannelTable, wiring: ChannelTable | None) -> tuple[Rest
 
 
 def move_outputs(
-    table: ChannelTable,
-    wiring: ChannelTable | None,
-    stroke: float,
-    stop: Callable[[], str | None],
+    table: ChannelTable, wiring: ChannelTable | None, stroke: float, stop: Callable[[], str | None]
 ) -> dict[str, tuple[str, float, float]]:
     """Move every output a little, one after another, under supervision.
 

@@ -85,9 +85,7 @@ def _delay_times(inverse: Roots, frequency: float) -> Array:
 
 
 def _smallest(
-    loop: Loop,
-    condition: Callable[[Roots], Array],
-    times: Callable[[Roots, float], Array],
+    loop: Loop, condition: Callable[[Roots], Array], times: Callable[[Roots, float], Array]
 ) -> Critical | None:
     # A loop that is unstable without any lag has the critical time 0.
     poles = roots(instant(loop).coef)
@@ -135,8 +133,8 @@ def _frequencies(loop: Loop) -> Array:
     near = resonances[:, None] * np.concatenate([1.0 - towards, 1.0 + towards])
     return np.unique(
         np.concatenate(
-            [np.logspace(low, high, int((high - low) * POINTS_PER_DECADE)), near.ravel()],
-        ),
+            [np.logspace(low, high, int((high - low) * POINTS_PER_DECADE)), near.ravel()]
+        )
     )
 
 

@@ -42,7 +42,7 @@ def rightmost_delay_root(loop: Loop, delay: float) -> complex:
     converged = [root for root in refined if root is not None]
     if not converged:
         raise RigtwinError(
-            f"no root found with a delay of {delay:g} s: expected a loop of bounded frequencies",
+            f"no root found with a delay of {delay:g} s: expected a loop of bounded frequencies"
         )
     best = max(converged, key=lambda root: root.real)
     return complex(best.real, abs(best.imag))
@@ -61,9 +61,7 @@ def _generator_eigenvalues(loop: Loop, delay: float, nodes: int) -> Roots:
     points = np.cos(angles)
     # Barycentric weights of Chebyshev nodes of the second kind: ±1, halved at both ends.
     weights = (-1.0) ** np.arange(nodes + 1) * np.where(
-        (angles == 0.0) | (np.arange(nodes + 1) == nodes),
-        0.5,
-        1.0,
+        (angles == 0.0) | (np.arange(nodes + 1) == nodes), 0.5, 1.0
     )
     # The derivative along the past: d/dθ of the state history, for each of its components.
     generator = np.kron(_derivative(points, weights) * (2.0 / longest), np.eye(degree))

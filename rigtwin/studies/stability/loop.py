@@ -94,7 +94,7 @@ def lag_polynomial(loop: Loop, lag: float) -> Polynomial:
 def delay_function(loop: Loop, delay: float, s: complex) -> complex:
     """Return the characteristic function at s, with z = exp(−delay s) and the delay in s."""
     return complex(
-        sum(polynomial(s) * np.exp(-power * delay * s) for power, polynomial in loop.items()),
+        sum(polynomial(s) * np.exp(-power * delay * s) for power, polynomial in loop.items())
     )
 
 

@@ -188,7 +188,7 @@ def mechanics(plant: RigPlant, preload: float) -> tuple[Array, Array, Array]:
     a, b, c = np.zeros((9, 9)), np.zeros((9, 2)), np.zeros((3, 9))
     a[CYLINDER, CYLINDER] = inner
     for number, (lag, gain, place) in enumerate(
-        ((cylinder.lag, cylinder.gain, FED), (motor.lag, motor.gain, VOLTS)),
+        ((cylinder.lag, cylinder.gain, FED), (motor.lag, motor.gain, VOLTS))
     ):
         if lag > 0.0:
             a[place, place], b[place, number] = -1.0 / lag, gain / lag
@@ -301,10 +301,10 @@ def linear_controller(
         return np.where(np.abs(change) > noise, change, 0.0)
 
     by_state = np.column_stack(
-        [slope(PERTURBATION * _unit(SIZE, place), True) for place in range(SIZE)],
+        [slope(PERTURBATION * _unit(SIZE, place), True) for place in range(SIZE)]
     )
     by_sensor = np.column_stack(
-        [slope(PERTURBATION * _unit(4, place), False) for place in (1, 2, 3)],
+        [slope(PERTURBATION * _unit(4, place), False) for place in (1, 2, 3)]
     )
     return (by_state[:SIZE], by_sensor[:SIZE]), (by_state[SIZE:], by_sensor[SIZE:])
 

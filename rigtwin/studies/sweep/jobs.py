@@ -61,9 +61,7 @@ def run_jobs(
 
 
 def iterate_results(
-    workers: Workers,
-    function: Callable[[Any], Any],
-    jobs: Iterable[Job],
+    workers: Workers, function: Callable[[Any], Any], jobs: Iterable[Job]
 ) -> Iterator[tuple[str, Any]]:
     """Yield the key and the result of every job, in the order in which they finish.
 

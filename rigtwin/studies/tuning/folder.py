@@ -123,9 +123,7 @@ def _held_out(result: TuningResult) -> str:
     """Return the table of comparisons, one line per measure."""
     spreads = [f"{when}_{what}" for when in ("before", "after") for what in ("median", "5%", "95%")]
     names = ["rig", "settings", "against", "measure", "unit", *spreads]
-    rows: list[list[object]] = [
-        [*names, "change", "low", "high", "change_in", "no_worse", "runs"],
-    ]
+    rows: list[list[object]] = [[*names, "change", "low", "high", "change_in", "no_worse", "runs"]]
     for comparison in (*result.comparisons, *result.front_comparisons):
         rows += _rows(comparison)
     return _csv(rows)

@@ -74,9 +74,7 @@ def values_at(parameters: Sequence[TuningParameter], shares: Array) -> tuple[flo
 
 
 def set_values(
-    settings: Settings,
-    parameters: Sequence[TuningParameter],
-    values: Sequence[float],
+    settings: Settings, parameters: Sequence[TuningParameter], values: Sequence[float]
 ) -> Settings:
     """Return the controller's settings with one value set per parameter."""
     pairs = zip(parameters, values, strict=True)

@@ -126,10 +126,7 @@ class TuningSearch:
         return lost, score.limits - goals.limits, *beyond
 
     def minimise(
-        self,
-        objective: Measure,
-        evaluations: int,
-        within: tuple[Measure, float] | None = None,
+        self, objective: Measure, evaluations: int, within: tuple[Measure, float] | None = None
     ) -> Candidate | None:
         """Search for the best allowed candidate, starting from those already tried.
 

@@ -98,10 +98,7 @@ def _machine(path: Path, tables: Mapping[str, Any]) -> Machine:
 
 
 def parse_study(
-    name: str,
-    tables: Mapping[str, Any],
-    machine: Machine,
-    overrides: Changes | None = None,
+    name: str, tables: Mapping[str, Any], machine: Machine, overrides: Changes | None = None
 ) -> Study:
     """Return the study described by TOML tables.
 
