@@ -147,19 +147,15 @@ def fit_transfer_function(
             -response * s**power for power in range(poles - 1, -1, -1)
         ]
         # Unknown are the numerator and the denominator without its leading 1.
-        matrix, right_side = (
-            np.column_stack(columns) * weight[:, None],
-            response * s**poles * weight,
-        )
+        matrix = np.column_stack(columns) * weight[:, None]
+        right_side = response * s**poles * weight
         coefficients = np.linalg.lstsq(
             np.concatenate([matrix.real, matrix.imag]),
             np.concatenate([right_side.real, right_side.imag]),
             rcond=None,
         )[0]
-        numerator, denominator = (
-            coefficients[: zeros + 1],
-            np.concatenate([[1.0], coefficients[zeros + 1 :]]),
-        )
+        numerator = coefficients[: zeros + 1]
+        denominator = np.concatenate([[1.0], coefficients[zeros + 1 :]])
         weight = 1.0 / np.abs(np.polyval(denominator, s))
     return (
         numerator * scale ** (poles - np.arange(zeros, -1.0, -1.0)),

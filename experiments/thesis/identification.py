@@ -190,10 +190,8 @@ def _mechanical(results: Mapping[str, Result]) -> list[Entry]:
         entries.append(
             factor("Figure 6.13", f"breakaway of the rail, {way}", "50", [breakaway], "N", 1.05)
         )
-    force, deflection = (
-        np.asarray(results["tyre"]["force"]),
-        np.asarray(results["tyre"]["deflection"]),
-    )
+    force = np.asarray(results["tyre"]["force"])
+    deflection = np.asarray(results["tyre"]["deflection"])
     # Least squares through the origin: friction acts both ways and cancels.
     line = float(np.sum(force * deflection) / np.sum(deflection**2))
     note = (

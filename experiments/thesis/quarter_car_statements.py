@@ -51,11 +51,9 @@ def statements() -> list[Entry]:
     )
     damped = _time(critical_lag(LOOPS["suspension"](ARBITRARY._replace(tyre_damping=10.0))))
     sample = f"of {RANDOM_CARS} vehicles drawn at random"
-    where, quantity, claim = (
-        "Equation 5.57",
-        "critical lag of suspension MIL",
-        "b/k whatever the tyre",
-    )
+    where = "Equation 5.57"
+    quantity = "critical lag of suspension MIL"
+    claim = "b/k whatever the tyre"
     note = "as Table 5.6, case 4: it holds without tyre damping alone"
     words = f"{damped:.4f} s, b/k = {SUSPENSION_LAG:g} s"
     entries = [
@@ -104,10 +102,8 @@ def _only_body(name: str, drawn: Sequence[QuarterCar]) -> Entry:
             f"; median unsprung over sprung natural frequency {with_it:.2f} "
             f"in those, {without:.2f} in the others"
         )
-    says, note = (
-        "only the body hop can become unstable",
-        "false for slow wheels, heavy or on soft tyres" if any(unstable) else "",
-    )
+    says = "only the body hop can become unstable"
+    note = "false for slow wheels, heavy or on soft tyres" if any(unstable) else ""
     return statement("§5.3.6", f"structure MIL, {name}", says, not any(unstable), words, note)
 
 

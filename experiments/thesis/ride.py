@@ -183,10 +183,8 @@ def tracking_entries(
     within: float,
 ) -> list[Entry]:
     """Return the entries of a table of appendix B: force error in N and %, position in m and %."""
-    force, position = (
-        over_seeds(results, name, "force_total"),
-        over_seeds(results, name, "position_total"),
-    )
+    force = over_seeds(results, name, "force_total")
+    position = over_seeds(results, name, "position_total")
     force_share = 100 * force / over_seeds(results, name, "ideal_force")
     position_share = 100 * position / over_seeds(results, name, "ideal_position")
     return [

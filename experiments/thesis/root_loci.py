@@ -83,10 +83,8 @@ def _ratio(table: str) -> Entry:
     """Return the entry of the sweep of k_s = m_s: it must change the damping ratio alone."""
     variation = of_damping_ratio(FILTER_LAG)
     ends = [variation.at(value).car.sprung for value in (variation.start, variation.end)]
-    frequencies, ratios = (
-        [mass.natural_frequency for mass in ends],
-        [mass.damping_ratio for mass in ends],
-    )
+    frequencies = [mass.natural_frequency for mass in ends]
+    ratios = [mass.damping_ratio for mass in ends]
     words = f"{frequencies[0]:g} to {frequencies[1]:g} rad/s, ζ from {ratios[0]:g} to {ratios[1]:g}"
     varies = frequencies[0] == frequencies[1] and ratios[0] > ratios[1]
     return statement(

@@ -142,11 +142,9 @@ def _table_2() -> list[Entry]:
     """Return the entries of Table 3.2, worked back from the scaled values of Table 3.3."""
     where, (_, stroke) = "Table 3.2", RECONSTRUCTED
     # Ratios of Table 3.3 to Table 3.1: the scale factors of mass, damping, and the speed.
-    wheel, damper, fast = (
-        number("8.36") / BOEING.unsprung_mass,
-        number("772") / BOEING.damping,
-        number("0.966"),
-    )
+    wheel = number("8.36") / BOEING.unsprung_mass
+    damper = number("772") / BOEING.damping
+    fast = number("0.966")
     because = "wheel mass and damping of Table 3.3 both ask for 500 kg; 500 is right"
     back = "worked back from Table 3.3"
     return [

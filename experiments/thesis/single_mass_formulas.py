@@ -182,10 +182,8 @@ def _double_lag() -> list[Entry]:
         return (critical.time if critical else math.inf) - lag
 
     # The stiffness at which the lag is critical, with the damping of 1 Ns/m: numerically k/b.
-    first, second = (
-        _root(lambda k: excess(k, 1, 1.0 / at_45_degrees)),
-        _root(lambda k: excess(k, 2, FILTER)),
-    )
+    first = _root(lambda k: excess(k, 1, 1.0 / at_45_degrees))
+    second = _root(lambda k: excess(k, 2, FILTER))
     safe = f"up to 45° the second order filter is ahead by {min(lead):.2g} to {max(lead):.2g}°"
     return [
         digits("§5.1.6", "frequency of 45° lag", "41.4", at_45_degrees, "rad/s"),

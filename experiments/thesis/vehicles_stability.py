@@ -123,10 +123,8 @@ def _entries(cars: Mapping[str, QuarterCar]) -> list[Entry]:
     for name, body, wheel, _ in SHOWN:
         pole, note = growth(cars[name]), CAR_NOTE if name == "car" else ""
         for figure in (body, wheel):
-            where, words = (
-                f"Figure {figure.partition(',')[0]}",
-                f"{pole.real:+.3f} ± {pole.imag:.2f}j 1/s",
-            )
+            where = f"Figure {figure.partition(',')[0]}"
+            words = f"{pole.real:+.3f} ± {pole.imag:.2f}j 1/s"
             entries.append(
                 statement(
                     where, f"{name}, four lags of 10 ms", "unstable", pole.real > 0.0, words, note

@@ -222,11 +222,9 @@ class LivePage:
         row = next(n for n, row in enumerate(watch.machine.rows) if row.name == self._sensor.value)
         # Beyond `judged` the band filter lacks what follows, and distorts the signal.
         known = gap.time < watch.judged
-        time, measured, predicted = (
-            gap.time[known],
-            gap.measured[row][known],
-            gap.predicted[row][known],
-        )
+        time = gap.time[known]
+        measured = gap.measured[row][known]
+        predicted = gap.predicted[row][known]
         residual = measured - predicted
         self._plots.name(
             self._sensor.value,

@@ -125,10 +125,8 @@ def set_spans(
     for line, signal in zip(table.inputs, still, strict=True):
         if line.name in references:
             # value = factor · volts + offset: the span scales only the part without the offset.
-            moved, wanted = (
-                signal.mean - line.scaling.offset,
-                references[line.name] - line.scaling.offset,
-            )
+            moved = signal.mean - line.scaling.offset
+            wanted = references[line.name] - line.scaling.offset
             # Near zero the span is a quotient of two small numbers.
             if abs(moved) < 10.0 * signal.noise:
                 raise RigtwinError(

@@ -65,10 +65,8 @@ class Card:
         """
         self._table, self._period, self._channel = table, period, channel
         # A tick converts a few numbers: passing them to compiled code would take longer.
-        self._inputs, self._outputs = (
-            rows(conversion(table.inputs)),
-            rows(conversion(table.outputs)),
-        )
+        self._inputs = rows(conversion(table.inputs))
+        self._outputs = rows(conversion(table.outputs))
         self._volts, self._asked = np.zeros(len(table.inputs)), np.zeros(len(table.outputs))
         self._signals = table.signals
         self._pacer, self._clock = pacer, clock
@@ -148,20 +146,16 @@ class Card:
                 inputs.timing.cfg_samp_clk_timing(
                     1.0 / self._period, sample_mode=AcquisitionType.CONTINUOUS, samps_per_chan=1000
                 )
-            self._reader, self._writer = (
-                AnalogMultiChannelReader(inputs.in_stream),
-                AnalogMultiChannelWriter(outputs.out_stream),
-            )
+            self._reader = AnalogMultiChannelReader(inputs.in_stream)
+            self._writer = AnalogMultiChannelWriter(outputs.out_stream)
             # Shapes are right by construction; checking them costs microseconds in every tick.
             self._reader.verify_array_shape = self._writer.verify_array_shape = False
             self._writer.auto_start = False
             # Outputs first: once samples arrive, the loop must be able to answer them.
             for task in (outputs, pressure, inputs):
                 task.start()
-            self._stream, self._power = (
-                inputs.in_stream,
-                DigitalSingleChannelWriter(pressure.out_stream),
-            )
+            self._stream = inputs.in_stream
+            self._power = DigitalSingleChannelWriter(pressure.out_stream)
             self._power.auto_start = False
 
     def read(self) -> tuple[float, ...]:

@@ -86,10 +86,8 @@ class FailsafeOutputs:
         from nidaqmx import Task
         from nidaqmx.grpc_session_options import GrpcSessionOptions, SessionInitializationBehavior
 
-        channel, attach = (
-            connect(self._table.address),
-            SessionInitializationBehavior.ATTACH_TO_SERVER_SESSION,
-        )
+        channel = connect(self._table.address)
+        attach = SessionInitializationBehavior.ATTACH_TO_SERVER_SESSION
         assert channel is not None
         # The writers take the first two by their place. The inputs are attached so that `close`
         # also ends the owner's acquisition.

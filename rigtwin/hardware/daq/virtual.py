@@ -90,13 +90,11 @@ class _Task:
     """Task of the driver; `next` is the tick of the sample it reads next."""
 
     def __init__(self, name: str) -> None:
-        self.name, self.lines, self.clocked, self.running, self.next = (
-            name,
-            list[str](),
-            False,
-            False,
-            0,
-        )
+        self.name = name
+        self.lines = list[str]()
+        self.clocked = False
+        self.running = False
+        self.next = 0
 
 
 class VirtualCard:
@@ -125,10 +123,8 @@ class VirtualCard:
 
     def __init__(self, terminals: Wired, wiring: ChannelTable, time: OnDemand | RealTime) -> None:
         self._terminals, self._time, self._device = terminals, time, wiring.device
-        self._inputs, self._outputs = (
-            [line.line for line in wiring.inputs],
-            [line.line for line in wiring.outputs],
-        )
+        self._inputs = [line.line for line in wiring.inputs]
+        self._outputs = [line.line for line in wiring.outputs]
         self._power_line = wiring.power
         # All four outputs of the card exist and drop to zero, whether or not a signal is wired to
         # them.

@@ -237,12 +237,10 @@ def _transducer(sensor: object, period: float) -> tuple[Array, Array, Array, flo
     part = max(delay / period - whole, 0.0)
     # A lag's discrete filter: y[k] = y[k-1] + share (x[k] - y[k-1]).
     length, share = whole + 1, 1.0 if lag == 0.0 else 1.0 - math.exp(-period / lag)
-    a, b, late, direct = (
-        np.zeros((length + 1,) * 2),
-        np.zeros((length + 1, 1)),
-        np.zeros(length + 1),
-        0.0,
-    )
+    a = np.zeros((length + 1,) * 2)
+    b = np.zeros((length + 1, 1))
+    late = np.zeros(length + 1)
+    direct = 0.0
     b[0, 0] = 1.0
     for place in range(1, length):
         a[place, place - 1] = 1.0
