@@ -206,7 +206,7 @@ def test_mistakes_are_said_before_anything_moves(
 
 @pytest.mark.slow
 def test_the_rig_is_armed_only_after_a_dry_run_of_just_that(card, capsys, tmp_path, monkeypatch):
-    monkeypatch.setattr(permission, "open_card", lambda _: None)
+    monkeypatch.setattr(permission, "open_card", lambda *_: None)
     monkeypatch.chdir(tmp_path)
     run = ["run", "imposed", "--target", "daq", "--card", str(card), *SHORT]
     assert main(run) == 1

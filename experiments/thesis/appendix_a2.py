@@ -26,9 +26,8 @@ from experiments.thesis.loci import Claim, LocusCase, locus
 from rigtwin.studies.stability.locus import BODY, WHEEL
 
 A2_9 = (
-    "at low ratios every pole is near its ideal one, as the thesis goes "
-    "on to say of the wheel hop; the body hop's damping has "
-    "the wrong sign all the same"
+    "at low ratios every pole is near its ideal one, as the thesis goes on to say of the wheel "
+    "hop; the body hop's damping has the wrong sign all the same"
 )
 
 

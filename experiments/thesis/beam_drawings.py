@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 from scipy.signal import welch
@@ -63,7 +64,7 @@ def modes_drawing(settings: Settings) -> Drawing:
     )
 
 
-def wing_drawing(results: dict[str, Result]) -> Drawing:
+def wing_drawing(results: Mapping[str, Result]) -> Drawing:
     """Draw the heights of the points along an arm."""
     figure, axes = sheet(3, 1, height=2.3)
     for row, (name, label) in zip(
@@ -99,7 +100,7 @@ def wing_drawing(results: dict[str, Result]) -> Drawing:
     return Drawing("figure-7.15", "Figure 7.15, 7.20, 7.24, B3.7, B4.7 and B5.7", caption, figure)
 
 
-def spectrum(results: dict[str, Result]) -> Drawing:
+def spectrum(results: Mapping[str, Result]) -> Drawing:
     """Draw the spectrum of the sprung mass with its second resonance (Fig. 7.16)."""
     figure, axes = sheet(1, 1, width=7.5, height=3.2)
     axis = axes[0][0]

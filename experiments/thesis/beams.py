@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import partial
 
 import numpy as np
 from scipy.linalg import eigh
@@ -29,10 +30,9 @@ TABLE_7_5 = {"bent passive": "0.679", "semi-active": "0.256", "active": "0.227"}
 The passive test with straight beams diverges on the twin, see `RUNS_AWAY`.
 """
 RUNS_AWAY = (
-    "with beams that start straight, as in Fig. 7.15, the centre's first "
-    "swing asks 0.72 m/s of a cylinder that gives 0.3, and "
-    "the passive twin runs away; these are of beams that start "
-    "bent by the preload, whose drop is smaller"
+    "with beams that start straight, as in Fig. 7.15, the centre's first swing asks 0.72 m/s of a "
+    "cylinder that gives 0.3, and the passive twin runs away; these are of beams that start bent "
+    "by the preload, whose drop is smaller"
 )
 ON_A_SPRING = 1000.0
 """Stiffness of the spring under the centre, N/m, that shifts the modes in Figure 7.16."""
@@ -65,13 +65,7 @@ def _run(name: str, seed: int) -> Result:
 
 def jobs(seeds: int) -> Mapping[str, Job]:
     """Return the jobs of the study."""
-    return seeded(
-        {
-            name: lambda seed, name=name: _run(name, seed)
-            for name in (*TABLE_7_5, "straight passive")
-        },
-        seeds,
-    )
+    return seeded({name: partial(_run, name) for name in (*TABLE_7_5, "straight passive")}, seeds)
 
 
 def _on_spring(settings: Settings) -> np.ndarray:
@@ -141,7 +135,7 @@ def _structure(settings: Settings) -> list[Entry]:
     ]
 
 
-def _entries(results: dict[str, Result]) -> list[Entry]:
+def _entries(results: Mapping[str, Result]) -> list[Entry]:
     """Return all entries of §7.2 and of appendices B3 to B5."""
     entries = _structure(find("beam-passive").configuration.controller)
     for name, text in TABLE_7_5.items():
@@ -197,7 +191,7 @@ def _entries(results: dict[str, Result]) -> list[Entry]:
     return entries + _statements(results)
 
 
-def _statements(results: dict[str, Result]) -> list[Entry]:
+def _statements(results: Mapping[str, Result]) -> list[Entry]:
     """Return the entries of what §7.2 says about its figures."""
     entries = []
     result = results[f"semi-active/{SHOWN_SEED}"]
@@ -257,9 +251,9 @@ def _statements(results: dict[str, Result]) -> list[Entry]:
 
 def conclude(results: Mapping[str, Result]) -> Conclusion:
     """Return the entries, drawings and remarks of §7.2."""
-    by_key = dict(results)
+
     shown = {
-        "passive, bent start" if name == "bent passive" else name: by_key[f"{name}/{SHOWN_SEED}"]
+        "passive, bent start" if name == "bent passive" else name: results[f"{name}/{SHOWN_SEED}"]
         for name in TABLE_7_5
     }
     covers = "Figure 7.12 to 7.14, 7.17 to 7.19, 7.21 to 7.23, 7.25 to 7.27, B3.1 to B5.6"
@@ -271,11 +265,11 @@ def conclude(results: Mapping[str, Result]) -> Conclusion:
             "The beams under passive, semi-active and active suspension.",
             shown,
         ),
-        wing_drawing(by_key),
-        spectrum(by_key),
+        wing_drawing(results),
+        spectrum(results),
     ]
-    remarks = [ride.remark(by_key, name) for name in TABLE_7_5]
-    return Conclusion(_entries(by_key), drawings, remarks)
+    remarks = [ride.remark(results, name) for name in TABLE_7_5]
+    return Conclusion(_entries(results), drawings, remarks)
 
 
 STUDY = ThesisStudy(

@@ -7,13 +7,18 @@ from collections.abc import Mapping
 import numpy as np
 
 from controllers.friction import MOTOR_LAG
-from experiments.thesis.study import Drawing, Result, sheet
+from experiments.thesis.study import Drawing, Result, sheet, trace
 from rigtwin.numerics.arrays import Array
 from rigtwin.render.plot import ASKED, SENSED
 from rigtwin.render.style import COLOURS
 
 IN_TIME, LATE = 0.9e-3, 15e-3
 """Time from the first step to the second, s: when the error has vanished, and well after it."""
+ROWS = (
+    *("none", "one-step 4", "two-step 4"),
+    *("calibrated one-step", "calibrated two-step", "observer"),
+)
+"""Compensators that are compared; `4` is the thesis' threshold in N."""
 
 
 def errors_of(results: Mapping[str, Result], loop: str, row: str) -> dict[str, Array]:
@@ -56,18 +61,11 @@ def _timing_drawing(results: Mapping[str, Result]) -> Drawing:
     figure, axes = sheet(1, 3, height=3.0)
     none = results["timing/None"]
     for axis, offsets in zip(axes[0], ((0.0, 0.005), (-0.015, -0.005), (0.015,)), strict=True):
-        axis.plot(
-            none["time"], none["error"], color=COLOURS["other"], linewidth=0.8, label="no step"
-        )
+        trace(axis, none, "error", color=COLOURS["other"], linewidth=0.8, label="no step")
         for offset, colour in zip(offsets, (SENSED, ASKED), strict=False):
+            label = f"step {1e3 * offset:+.0f} ms from reversal"
             timed = results[f"timing/{offset}"]
-            axis.plot(
-                timed["time"],
-                timed["error"],
-                color=colour,
-                linewidth=0.8,
-                label=f"step {1e3 * offset:+.0f} ms from reversal",
-            )
+            trace(axis, timed, "error", color=colour, linewidth=0.8, label=label)
         axis.set(xlim=(2.0, 3.2), xlabel="time, s", ylabel="force error, N")
         axis.legend(fontsize=7)
     return Drawing(
@@ -117,8 +115,8 @@ def _section_drawing(results: Mapping[str, Result]) -> Drawing:
     figure, axes = sheet(3, 1, height=2.3)
     section = results["calibrated-nominal"]
     time = np.asarray(section["time"])
-    axes[0][0].plot(time, section["none force"], color=SENSED, linewidth=0.8, label="felt")
-    axes[0][0].plot(time, section["none asked"], color=ASKED, linewidth=0.9, label="demanded")
+    trace(axes[0][0], section, "none force", color=SENSED, linewidth=0.8, label="felt")
+    trace(axes[0][0], section, "none asked", color=ASKED, linewidth=0.9, label="demanded")
     axes[0][0].set(ylabel="force, N", title="no compensation")
     pairs = (
         (("none", COLOURS["other"]), ("one-step", SENSED), ("two-step", ASKED)),
@@ -190,16 +188,8 @@ def _two_step_drawing() -> Drawing:
 def _bars(results: Mapping[str, Result]) -> Drawing:
     """Draw the errors of the compensators as bars, for both force loops."""
     figure, axes = sheet(1, 2, height=3.4)
-    names = (
-        "none",
-        "one-step 4",
-        "two-step 4",
-        "calibrated one-step",
-        "calibrated two-step",
-        "observer",
-    )
     for axis, loop in zip(axes[0], ("nominal", "fitted"), strict=True):
-        for number, name in enumerate(names):
+        for number, name in enumerate(ROWS):
             errors = errors_of(results, loop, name)
             tracking, numerical = (
                 float(np.median(errors[key])) for key in ("tracking", "numerical")
@@ -215,8 +205,8 @@ def _bars(results: Mapping[str, Result]) -> Drawing:
         axis.set(
             title=f"{loop} force loop",
             xlabel="rms error, N",
-            yticks=range(len(names)),
-            yticklabels=names,
+            yticks=range(len(ROWS)),
+            yticklabels=ROWS,
         )
         axis.invert_yaxis()
         axis.legend(fontsize=8)

@@ -69,9 +69,8 @@ def not_unstable_at(value: float) -> Judge:
     def judge(locus: Locus) -> tuple[bool, str]:
         # On the boundary the real part is zero up to rounding.
         rightmost = locus.poles_at(value).real.max()
-        return bool(
-            rightmost <= TOGETHER
-        ), f"real part {rightmost:.2g} 1/s at {value:g}; {describe_crossings(locus)}"
+        words = f"real part {rightmost:.2g} 1/s at {value:g}; {describe_crossings(locus)}"
+        return bool(rightmost <= TOGETHER), words
 
     return judge
 
@@ -81,9 +80,8 @@ def unstable_before_start(*modes: str) -> Judge:
 
     def judge(locus: Locus) -> tuple[bool, str]:
         unstable = locus.unstable_modes(float(locus.values[0]) / BEYOND)
-        return set(modes) <= set(
-            unstable
-        ), f"{' and '.join(unstable) or 'nothing'} unstable {BEYOND:g} times before the start"
+        words = f"{' and '.join(unstable) or 'nothing'} unstable {BEYOND:g} times before the start"
+        return set(modes) <= set(unstable), words
 
     return judge
 

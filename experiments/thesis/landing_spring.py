@@ -182,9 +182,8 @@ def _charge(spring: GasSpring) -> list[Entry]:
     ratio = charge.gas / charge.cylinder
     odd = BOEING.exponent * BOEING.gas_length / PRINTED[1]
     gas = (
-        "by the thesis' own rule cylinder : gas = stroke : length, "
-        f"1 : {ratio:.3f}; printed 1 : {334 / 209:.3f}, "
-        f"near 1.4 · 0.673/0.589 = {odd:.3f}, as if multiplied by the exponent"
+        f"by the thesis' own rule cylinder : gas = stroke : length, 1 : {ratio:.3f}; printed 1 : "
+        f"{334 / 209:.3f}, near 1.4 · 0.673/0.589 = {odd:.3f}, as if multiplied by the exponent"
     )
     return [
         digits(where, "cylinder's area", "0.0012", area, "m²", source),

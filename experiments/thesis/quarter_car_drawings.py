@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from experiments.thesis.study import Drawing, Result, sheet
+from experiments.thesis.study import Drawing, Result, sheet, trace
 from rigtwin.numerics.arrays import Array
 from rigtwin.render.plot import ASKED, SENSED
 from rigtwin.render.style import COLOURS
@@ -79,8 +79,7 @@ def lagged_drops() -> dict[str, tuple[float, Array]]:
 def histories(name: str, result: Result, covers: str, until: float) -> Drawing:
     """Draw the time histories of a test until a time, s, and its error subspaces."""
     figure, axes = sheet(2, 3, height=2.6)
-    time = np.asarray(result["time"])
-    shown = time <= until
+    shown = np.asarray(result["time"]) <= until
     panels = (
         ("plate", "sprung mass, mm"),
         ("travel", "suspension travel, mm"),
@@ -88,16 +87,8 @@ def histories(name: str, result: Result, covers: str, until: float) -> Drawing:
         ("force", "suspension force, N"),
     )
     for axis, (kind, label) in zip([*axes[0], axes[1][0]], panels, strict=True):
-        axis.plot(
-            time[shown],
-            np.asarray(result[f"ideal {kind}"])[shown],
-            color=IDEAL,
-            linewidth=1.2,
-            label="ideal",
-        )
-        axis.plot(
-            time[shown], np.asarray(result[kind])[shown], color=SENSED, linewidth=0.8, label="twin"
-        )
+        trace(axis, result, f"ideal {kind}", shown, color=IDEAL, linewidth=1.2, label="ideal")
+        trace(axis, result, kind, shown, color=SENSED, linewidth=0.8, label="twin")
         axis.set(xlabel="time, s", ylabel=label)
     axes[0][0].legend(fontsize=8)
     # Twin over ideal: delay opens a loop about the diagonal, friction makes steps across it.

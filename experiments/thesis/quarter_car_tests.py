@@ -287,9 +287,9 @@ def _damped_wheel() -> tuple[bool, str]:
         # 4000 ticks of 1 ms; the hop is judged from 0.6 to 1.6 s, after its first swing.
         wheel = simulate_ideal(configuration._replace(plant=plant), np.zeros(4000)).wheel
         remaining.append(float(np.std(hop(wheel, 1e-3)[600:1600])))
-    return remaining[1] < 0.1 * remaining[
-        0
-    ], f"{1e6 * remaining[1]:.1f} um rms left after 0.6 s, without {1e6 * remaining[0]:.0f} um"
+    without, damped = remaining
+    words = f"{1e6 * damped:.1f} um rms left after 0.6 s, without {1e6 * without:.0f} um"
+    return damped < 0.1 * without, words
 
 
 def conclude(results: Mapping[str, Result]) -> Conclusion:

@@ -19,9 +19,8 @@ def closest_at(end: str) -> Judge:
     def judge(locus: Locus) -> tuple[bool, str]:
         start, last = (_relative_distances(locus, float(value)) for value in locus.values[[0, -1]])
         first, second = max(start.values()), max(last.values())
-        return bool(
-            (first < second) == (end == "start")
-        ), f"{format_percent(first)} off at the start, {format_percent(second)} at the end"
+        words = f"{format_percent(first)} off at the start, {format_percent(second)} at the end"
+        return bool((first < second) == (end == "start")), words
 
     return judge
 

@@ -5,6 +5,8 @@ The studies of both structures, point mass and beams, share this module.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from controllers import Skyhook
@@ -130,7 +132,7 @@ def _damper(test: ThesisTrial) -> Array:
 
 
 def reduction(
-    results: dict[str, Result], better: str, base: str, value: str = "acceleration"
+    results: Mapping[str, Result], better: str, base: str, value: str = "acceleration"
 ) -> Array:
     """Return the reduction of a value against a base test, %, shape (seeds,)."""
     return 100 * (1 - over_seeds(results, better, value) / over_seeds(results, base, value))
@@ -142,21 +144,20 @@ def interval(values: Array, unit: str) -> str:
     return f"{middle:.3g}{unit} ({low:.3g} to {high:.3g})"
 
 
-def remark(results: dict[str, Result], name: str) -> str:
+def remark(results: Mapping[str, Result], name: str) -> str:
     """Return a remark on the acceleration of the body, by both measures, and of the ideal."""
     body, unfiltered, ideal = (
         over_seeds(results, name, key) for key in ("acceleration", "everything", "ideal everything")
     )
     return (
-        f"{name}: body acceleration {interval(body, ' m/s²')}, with "
-        f"everything in it {interval(unfiltered, '')}; "
-        f"ideal {interval(ideal, '')}"
+        f"{name}: body acceleration {interval(body, ' m/s²')}, with everything in it "
+        f"{interval(unfiltered, '')}; ideal {interval(ideal, '')}"
     )
 
 
 def reduction_entry(
     where: str,
-    results: dict[str, Result],
+    results: Mapping[str, Result],
     better: str,
     base: str,
     printed: str,
@@ -177,7 +178,7 @@ def reduction_entry(
 
 def tracking_entries(
     table: str,
-    results: dict[str, Result],
+    results: Mapping[str, Result],
     name: str,
     printed: tuple[str, str, str, str],
     within: float,
@@ -196,7 +197,7 @@ def tracking_entries(
 
 
 def histories(
-    name: str, covers: str, caption: str, runs: dict[str, Result], until: float = 20.0
+    name: str, covers: str, caption: str, runs: Mapping[str, Result], until: float = 20.0
 ) -> Drawing:
     """Draw sprung mass, travel and tyre deflection of several tests; until: last time shown, s."""
     figure, axes = sheet(3, 1, height=2.2)

@@ -19,9 +19,8 @@ from rigtwin.studies.stability.critical import critical_lag
 from rigtwin.studies.stability.loop import LOOPS
 
 CAPTION = (
-    "Grey: the ideal quarter car. Coloured: with the lag, from dark "
-    "at the start of the sweep to light at its end. "
-    "Crosses: where poles cross the imaginary axis."
+    "Grey: the ideal quarter car. Coloured: with the lag, from dark at the start of the sweep to "
+    "light at its end. Crosses: where poles cross the imaginary axis."
 )
 VARIED = {
     "1": "the lag",
@@ -125,10 +124,9 @@ def conclude(results: Mapping[str, Result]) -> Conclusion:
 REMARKS = (
     "Body hop and wheel hop are told apart as in §5.3.1, by whether "
     "the masses move the same way or against each other.",
-    "Tables A1.4, A1.5, A2.4, A2.5, A3.4 and A3.5 print τ = 0.333 s for "
-    "case 1. The loop is then unstable for every value of "
-    "the sweep, and most of what the sections say is false; "
-    "with 0.0333 s it is true. Both are drawn.",
+    "Tables A1.4, A1.5, A2.4, A2.5, A3.4 and A3.5 print τ = 0.333 s for case 1. The loop is then "
+    "unstable for every value of the sweep, and most of what the sections say is false; with "
+    "0.0333 s it is true. Both are drawn.",
     "Table A1.3 prints b_u for b_t, Table A3.4 is captioned Table "
     "A1.3, and §A2.2 calls cases 4 to 6 cases 3 to 5.",
 )

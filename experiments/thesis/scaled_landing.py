@@ -135,32 +135,27 @@ def _remarks(real: Scaling, slow: Scaling, off: float) -> list[str]:
     no_lift = float(np.max(touch_down(BOEING._replace(lift=0.0), INSTANTS)[0]))
     inside = float(np.max(touch_down(BOEING, INSTANTS)[0]))
     return [
-        "Tables 3.2 and 3.3: 500 kg and 0.559 m are right, not 200 kg and "
-        "0.589 m. Table 3.3's figures with a sprung mass of "
-        "200 kg are no similar system: that landing, mapped back, "
+        "Tables 3.2 and 3.3: 500 kg and 0.559 m are right, not 200 kg and 0.589 m. Table 3.3's "
+        "figures with a sprung mass of 200 kg are no similar system: that landing, mapped back, "
         f"is off by {100.0 * off:.0f} % of the peak.",
-        "Gas spring: length, 24.7 MN/m and 76 % follow from 0.559 m, "
-        "exponent 1.4 and three times the static load fully "
-        "compressed; the text says 0.589 m and four times. No stroke gives "
-        "the 3.79 MN/m at equilibrium: the closed form is "
+        "Gas spring: length, 24.7 MN/m and 76 % follow from 0.559 m, exponent 1.4 and three "
+        "times the static load fully compressed; the text says 0.589 m and four times. No stroke "
+        "gives the 3.79 MN/m at equilibrium: the closed form is "
         f"{1e-6 * stiffness(BOEING.spring, _rest()):.2f} MN/m.",
-        f"Pseudo-dynamic: {BOEING.velocity:g} m/s are "
-        f"{real.factor('m/s') * BOEING.velocity:.3f} m/s on the rig; a time scale "
-        f"of {slow.time:.3f} brings them to {Cylinder().speed_limit:g} "
-        "m/s. Forces fall by its square: the gas charge from "
-        f"{pressures[0]:.2f} to {pressures[1]:.2f} bar. To keep the gas "
-        "spring, scale its force in place of the mass: the "
-        f"numerical sprung mass is then {force_preserving.mass * BOEING.sprung_mass:.0f} kg "
-        "and the wheel "
-        f"{force_preserving.mass * BOEING.unsprung_mass:.0f} kg. A real gas spring that "
-        "is compressed slower gives off more heat, so its "
-        "exponent falls: time cannot be stretched freely where the gas is hardware.",
+        f"Pseudo-dynamic: {BOEING.velocity:g} m/s are {real.factor('m/s') * BOEING.velocity:.3f} "
+        f"m/s on the rig; a time scale of {slow.time:.3f} brings them to "
+        f"{Cylinder().speed_limit:g} m/s. Forces fall by its square: the gas charge from "
+        f"{pressures[0]:.2f} to {pressures[1]:.2f} bar. To keep the gas spring, scale its force "
+        "in place of the mass: the numerical sprung mass is then "
+        f"{force_preserving.mass * BOEING.sprung_mass:.0f} kg and the wheel "
+        f"{force_preserving.mass * BOEING.unsprung_mass:.0f} kg. A real gas spring that is "
+        "compressed slower gives off more heat, so its exponent falls: time cannot be stretched "
+        "freely where the gas is hardware.",
         "Eq. 3.4 and 3.5 as printed lack the exponent γ, take the tyre's "
         "deflection between the masses and leave out the "
         "wheel's weight; the landing is simulated with all three put right.",
-        "With full weight from touch-down on, as in Eq. 3.4, the "
-        f"strut is compressed by {no_lift:.3f} m, of "
-        f"{RECONSTRUCTED[1]:g} m; with lift that fades over "
+        "With full weight from touch-down on, as in Eq. 3.4, the strut is compressed by "
+        f"{no_lift:.3f} m, of {RECONSTRUCTED[1]:g} m; with lift that fades over "
         f"{BOEING.lift_time:g} s by {inside:.3f} m.",
     ]
 
@@ -219,11 +214,10 @@ def _drawing(
     axes[0][1].legend(fontsize=7, loc="lower right")
     axes[1][2].legend(fontsize=7)
     caption = (
-        "A Boeing 707 lands at 3 m/s: full size, and the rig of "
-        "500 kg and 0.18 m of stroke in real time and "
-        f"{scales[1].time:.2f} times slower. Mapped back by the scale factors "
-        f"they differ by {worst:.0e} of the peak at most; "
-        f"Table 3.3's figures with Table 3.2's 200 kg by {100.0 * off:.0f} %."
+        "A Boeing 707 lands at 3 m/s: full size, and the rig of 500 kg and 0.18 m of stroke in "
+        f"real time and {scales[1].time:.2f} times slower. Mapped back by the scale factors they "
+        f"differ by {worst:.0e} of the peak at most; Table 3.3's figures with Table 3.2's 200 kg "
+        f"by {100.0 * off:.0f} %."
     )
     return Drawing(
         "similitude", "landing in full size and at the rig's scale, §3.5", caption, figure

@@ -23,9 +23,8 @@ def asymptote(end: str) -> Judge:
             and abs(far.real - near.real) < 0.05 * abs(far.real)
             and far.real < 0.0
         )
-        return bool(
-            holds
-        ), f"real part → {far.real:.4g} 1/s, frequency {near.imag:.3g} → {far.imag:.3g} rad/s"
+        words = f"real part → {far.real:.4g} 1/s, frequency {near.imag:.3g} → {far.imag:.3g} rad/s"
+        return bool(holds), words
 
     return judge
 
@@ -121,9 +120,8 @@ def wheel_goes_left(locus: Locus) -> tuple[bool, str]:
     """Judge whether the real part of the fastest pair falls in the last third of the sweep."""
     third = locus.poles[2 * len(locus.poles) // 3 :]
     real = [max(row.tolist(), key=lambda pole: pole.imag).real for row in third]
-    return bool(
-        np.all(np.diff(real) < 0.0)
-    ), f"real part {real[0]:.3g} → {real[-1]:.3g} 1/s in the last third of the sweep"
+    words = f"real part {real[0]:.3g} → {real[-1]:.3g} 1/s in the last third of the sweep"
+    return bool(np.all(np.diff(real) < 0.0)), words
 
 
 def ends_left_of(reference: Locus, name: str) -> Judge:

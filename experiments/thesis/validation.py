@@ -9,7 +9,16 @@ from scipy.signal import csd, welch
 
 from experiments import find
 from experiments.thesis.entry import Entry, digits, factor, statement
-from experiments.thesis.study import Conclusion, Drawing, Job, Result, ThesisStudy, sheet, span
+from experiments.thesis.study import (
+    Conclusion,
+    Drawing,
+    Job,
+    Result,
+    ThesisStudy,
+    sheet,
+    span,
+    trace,
+)
 from experiments.thesis.trial import ThesisTrial, curves, errors, over_seeds, seeded, trial
 from rigtwin.render.plot import ASKED, SENSED
 from rigtwin.render.style import COLOURS
@@ -149,21 +158,9 @@ def _time_panels(result: Result, title: str) -> Drawing:
         (axes[0][0], "ideal plate", "asked position", "plate", "mm"),
         (axes[0][1], "ideal force", "asked force", "force", "N"),
     ):
-        axis.plot(time[early], np.asarray(result[quantity])[early], color=IDEAL, label="ideal")
-        axis.plot(
-            time[early],
-            np.asarray(result[asked])[early],
-            color=ASKED,
-            linewidth=1.0,
-            label="demanded",
-        )
-        axis.plot(
-            time[early],
-            np.asarray(result[sensed])[early],
-            color=SENSED,
-            linewidth=0.7,
-            label="twin",
-        )
+        trace(axis, result, quantity, early, color=IDEAL, label="ideal")
+        trace(axis, result, asked, early, color=ASKED, linewidth=1.0, label="demanded")
+        trace(axis, result, sensed, early, color=SENSED, linewidth=0.7, label="twin")
         axis.set(xlabel="time, s", ylabel=unit)
         axis.legend(fontsize=8, framealpha=0.85)
     axes[0][0].set_title(f"{title}: sprung mass")
@@ -173,20 +170,8 @@ def _time_panels(result: Result, title: str) -> Drawing:
         (axes[1][0], "asked position", "plate", "mm"),
         (axes[1][1], "asked force", "force", "N"),
     ):
-        axis.plot(
-            time[close],
-            np.asarray(result[asked])[close],
-            color=ASKED,
-            linewidth=1.0,
-            label="demanded",
-        )
-        axis.plot(
-            time[close],
-            np.asarray(result[sensed])[close],
-            color=SENSED,
-            linewidth=0.9,
-            label="twin",
-        )
+        trace(axis, result, asked, close, color=ASKED, linewidth=1.0, label="demanded")
+        trace(axis, result, sensed, close, color=SENSED, linewidth=0.9, label="twin")
         axis.set(title="tracking, close up", xlabel="time, s", ylabel=unit)
         axis.legend(fontsize=8, framealpha=0.85)
     number = "3.11 to 3.14" if "drop" in title else "3.15 to 3.17"

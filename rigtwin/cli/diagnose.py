@@ -11,9 +11,11 @@ from typing import TYPE_CHECKING, Any
 
 from rigtwin.cli.options import (
     add_columns,
+    add_held_out,
     add_json,
     add_machine,
     add_settings,
+    add_without,
     add_workers,
     counting_bar,
     read_recordings,
@@ -90,13 +92,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def _add_scope(parser: argparse.ArgumentParser) -> None:
     """Add the options that say what is searched for, and what is judged on."""
-    parser.add_argument(
-        "--without",
-        action="append",
-        default=[],
-        metavar="EFFECT",
-        help="take this out of the twin first, e.g. coulomb@rail",
-    )
+    add_without(parser)
     parser.add_argument(
         "--exclude",
         action="append",
@@ -104,15 +100,7 @@ def _add_scope(parser: argparse.ArgumentParser) -> None:
         metavar="EFFECT",
         help="do not look for this, e.g. delay@motor, or delay at every component",
     )
-    parser.add_argument(
-        "--held-out",
-        action="extend",
-        nargs="+",
-        type=Path,
-        default=[],
-        metavar="recording",
-        help="recordings of the same machine to judge on",
-    )
+    add_held_out(parser)
 
 
 def execute(parsed: argparse.Namespace) -> int:

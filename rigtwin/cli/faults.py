@@ -141,10 +141,9 @@ def _row(kind: FaultKind, results: list[FaultResult]) -> tuple[str, ...]:
 def _describe(result: FaultResult) -> str:
     fault = result.fault
     return (
-        f"{fault.kind.name} at tick {fault.at} of {fault.experiment}, place {fault.place}, "
-        f"seed {fault.seed}: safe "
-        f"{result.late} ticks late, {100 * result.exceeded:.0f} % of a limit, said {result.cause}: "
-        f"{result.reason}"
+        f"{fault.kind.name} at tick {fault.at} of {fault.experiment}, place {fault.place}, seed "
+        f"{fault.seed}: safe {result.late} ticks late, {100 * result.exceeded:.0f} % of a limit, "
+        f"said {result.cause}: {result.reason}"
     )
 
 

@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rigtwin.cli.options import add_machine, add_settings, settings_of
+from rigtwin.cli.options import add_machine, add_settings, add_without, settings_of
 from rigtwin.console import writable
 from rigtwin.errors import RigtwinError
 from rigtwin.files import forbid_overwriting
@@ -44,13 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="F.toml",
         help="file that the save button writes (default: RECORDING_twin.toml in this folder)",
     )
-    parser.add_argument(
-        "--without",
-        action="append",
-        default=[],
-        metavar="EFFECT",
-        help="take this out of the twin first, e.g. coulomb@rail",
-    )
+    add_without(parser)
     parser.add_argument("--port", type=int, default=8080, help="default 8080; 0 takes a free one")
     add_machine(parser)
     add_settings(parser)

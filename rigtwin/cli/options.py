@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rigtwin.console import assigned_settings
+from rigtwin.errors import RigtwinError
 
 if TYPE_CHECKING:
     import rigtwin
@@ -54,6 +55,28 @@ def add_machine(
     )
 
 
+def add_without(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--without",
+        action="append",
+        default=[],
+        metavar="EFFECT",
+        help="take this out of the twin first, e.g. coulomb@rail",
+    )
+
+
+def add_held_out(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--held-out",
+        action="extend",
+        nargs="+",
+        type=Path,
+        default=[],
+        metavar="recording",
+        help="recordings of the same machine to judge on",
+    )
+
+
 def add_columns(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--column",
@@ -74,8 +97,6 @@ def add_columns(parser: argparse.ArgumentParser) -> None:
 
 def columns_of(parsed: argparse.Namespace) -> dict[str, str]:
     """Return the statements of --column. Raise RigtwinError for a text without a source."""
-    from rigtwin.errors import RigtwinError
-
     stated: dict[str, str] = {}
     for text in parsed.column:
         key, equals, source = text.partition("=")
@@ -91,7 +112,6 @@ def read_recordings(
     """Return the recordings to explain and those held out; logs of a model are described first."""
     import rigtwin
     from rigtwin.api.describing import needs_description, record_log
-    from rigtwin.errors import RigtwinError
 
     stated = columns_of(parsed)
     paths, held_out = parsed.recordings, parsed.held_out

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from rigtwin.cli.options import add_machine, add_settings, settings_of
+from rigtwin.cli.options import add_machine, add_settings, add_without, settings_of
 
 SUMMARY = "hold a test against its twin while it runs, and raise an alarm at a gap"
 MORE = """\
@@ -22,13 +22,7 @@ exit code 4: an alarm was raised."""
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("recording", type=Path)
-    parser.add_argument(
-        "--without",
-        action="append",
-        default=[],
-        metavar="EFFECT",
-        help="take this out of the twin first, e.g. coulomb@rail",
-    )
+    add_without(parser)
     parser.add_argument(
         "--patience",
         type=float,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from rigtwin.importing.naming import split_unit
@@ -36,10 +35,6 @@ class Selection:
     def takes(self, name: str) -> bool:
         """Return whether a column is needed."""
         return self.names is None or name in self.names or name in self._bare
-
-    def takes_any(self, names: Iterable[str]) -> bool:
-        """Return whether at least one of these columns is needed."""
-        return any(self.takes(name) for name in names)
 
     def takes_within(self, name: str) -> bool:
         """Return whether a column is needed, or a part of it: `name.field`, `name[0]`, `name:1`."""

@@ -109,10 +109,9 @@ def require_even_ticks(time: Array, period: float, report: list[str]) -> None:
     if off.any():
         at = int(np.argmax(off))
         raise RigtwinError(
-            f"{int(off.sum())} gaps in time, "
-            f"the first of {steps[at]:.4g} s at {time[at] - time[0]:.4g} s where "
-            f"{period:g} s is the rule; take a stretch without them by [time] start and until, "
-            f"or say [time] resample = {period:g}"
+            f"{int(off.sum())} gaps in time, the first of {steps[at]:.4g} s at "
+            f"{time[at] - time[0]:.4g} s where {period:g} s is the rule; take a stretch without "
+            f"them by [time] start and until, or say [time] resample = {period:g}"
         )
     drift = abs((time[-1] - time[0]) / (len(time) - 1) - period)
     # The drift over the whole test counts, not that of one period.

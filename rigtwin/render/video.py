@@ -38,9 +38,8 @@ BEAM_COLOUR = np.array([0.82, 0.38, 0.24, 1.0], np.float32)
 GHOST_COLOUR = np.array([0.92, 0.43, 0.08, 0.4], np.float32)
 """Colour of the twin's prediction, the same as on the page of a look."""
 NO_RENDERING = (
-    "cannot render without a display; on Debian or Ubuntu: "
-    "sudo apt-get install libegl1 libgl1 libgl1-mesa-dri, "
-    "elsewhere install EGL or OSMesa and set MUJOCO_GL=egl or osmesa"
+    "cannot render without a display; on Debian or Ubuntu: sudo apt-get install libegl1 libgl1 "
+    "libgl1-mesa-dri, elsewhere install EGL or OSMesa and set MUJOCO_GL=egl or osmesa"
 )
 
 

@@ -25,13 +25,13 @@ STOP_SIGNALS: tuple[int, ...] = tuple(
     if hasattr(signal, name)
 )
 RENDERER = "glfw"
-_NORMAL, _HIGH, _REALTIME = 0x20, 0x80, 0x100
-"""NORMAL_, HIGH_ and REALTIME_PRIORITY_CLASS."""
+_NORMAL, _REALTIME = 0x20, 0x100
+"""NORMAL_ and REALTIME_PRIORITY_CLASS."""
 _USUAL, _CRITICAL = 0, 15
 """THREAD_PRIORITY_NORMAL and _TIME_CRITICAL."""
 _SYNCHRONIZE, _TERMINATE = 0x0010_0000, 0x0001
-_ENDED, _RUNS = 0x0, 0x102
-"""WAIT_OBJECT_0 and WAIT_TIMEOUT."""
+_ENDED = 0x0
+"""WAIT_OBJECT_0."""
 _GRAIN = 1
 """Finest resolution of the system's timers that can be requested, in ms."""
 

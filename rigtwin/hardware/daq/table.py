@@ -182,16 +182,14 @@ def require_reach(table: ChannelTable, limits: Mapping[str, tuple[str, float]]) 
         # An input must show that a limit is exceeded; an output must only reach it.
         if line.reach < HEADROOM * limit and line.name in inputs:
             raise RigtwinError(
-                "range too small for the limit: "
-                f"{line.name} on {line.line} reads up to {line.reach:.4g} {line.unit}, "
-                f"{key} is {limit:g} {line.unit}; expected at least {HEADROOM:g} times that, "
-                "or a smaller limit"
+                f"range too small for the limit: {line.name} on {line.line} reads up to "
+                f"{line.reach:.4g} {line.unit}, {key} is {limit:g} {line.unit}; expected at least "
+                f"{HEADROOM:g} times that, or a smaller limit"
             )
         if line.reach < limit:
             raise RigtwinError(
-                "range too small for the limit: "
-                f"{line.name} on {line.line} commands up to {line.reach:.4g} {line.unit}, "
-                f"{key} is {limit:g} {line.unit}"
+                f"range too small for the limit: {line.name} on {line.line} commands up to "
+                f"{line.reach:.4g} {line.unit}, {key} is {limit:g} {line.unit}"
             )
 
 

@@ -11,6 +11,7 @@ from rigtwin import __version__
 from rigtwin.description.configuration import flatten
 from rigtwin.hardware.daq.card import Card
 from rigtwin.hardware.daq.driver import connect, require_client
+from rigtwin.hardware.daq.table import ChannelTable
 from rigtwin.hardware.daq.table_file import to_toml
 from rigtwin.hardware.daq.virtual import OnDemand, VirtualCard
 from rigtwin.hardware.daq.wired import Wired
@@ -241,12 +242,10 @@ def _count_ticks(operation: Operation) -> int:
     return operation.ticks + round(2.0 * (course.ramp + course.hold + 1.0) / operation.period)
 
 
-def open_card(test: AnyTest) -> Card:
+def open_card(table: ChannelTable, period: float) -> Card:
     """Open the card and inspect it. Raise CardFault; nothing moves."""
-    period = test.period
-    channel = connect(test.table.address)
     # A card without its own clock is paced by this computer.
-    pacer = Pacer(period) if test.table.timing == "software" else None
-    card = Card(test.table, period, channel, pacer=pacer)
+    pacer = Pacer(period) if table.timing == "software" else None
+    card = Card(table, period, connect(table.address), pacer=pacer)
     card.inspect()
     return card

@@ -19,12 +19,11 @@ from rigtwin.hardware.daq.calibration import (
     plan_bumps,
 )
 from rigtwin.hardware.daq.card import Card
-from rigtwin.hardware.daq.driver import connect, require_client
+from rigtwin.hardware.daq.driver import require_client
 from rigtwin.hardware.daq.table import OUTPUTS, ChannelTable, Plausible
 from rigtwin.hardware.daq.terminals import Terminals
 from rigtwin.hardware.daq.virtual import OnDemand, VirtualCard
-from rigtwin.hardware.realtime import Pacer
-from rigtwin.hardware.session.record import record_in_real_time, record_unpaced
+from rigtwin.hardware.session.record import open_card, record_in_real_time, record_unpaced
 from rigtwin.hardware.session.test import Test
 from rigtwin.hardware.supervisor import COMPLETED
 from rigtwin.recording import load
@@ -37,18 +36,12 @@ def open_rig(table: ChannelTable, wiring: ChannelTable | None) -> Card:
     """Open a table's card, or a virtual one with another wiring. Raise RigtwinError if it fails."""
     period = Configuration().timing.period
     if wiring is None:
-        card = Card(
-            table,
-            period,
-            connect(table.address),
-            pacer=Pacer(period) if table.timing == "software" else None,
-        )
-    else:
-        require_client()
-        from rigtwin.hardware.daq.transport import InProcess
+        return open_card(table, period)
+    require_client()
+    from rigtwin.hardware.daq.transport import InProcess
 
-        virtual = VirtualCard(Terminals(Configuration(), wiring, 0), wiring, OnDemand())
-        card = Card(table, period, InProcess(virtual), clock=lambda: virtual.tick * period)
+    virtual = VirtualCard(Terminals(Configuration(), wiring, 0), wiring, OnDemand())
+    card = Card(table, period, InProcess(virtual), clock=lambda: virtual.tick * period)
     card.inspect()
     return card
 

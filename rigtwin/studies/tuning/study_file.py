@@ -26,8 +26,8 @@ from rigtwin.studies.tuning.study import Budget, Changes, Constraint, Goals, Stu
 
 BASELINE = "baseline"
 REQUIRED = ("experiment", "minimise", "parameters")
-KEYS = (
-    *(
+KEYS = tuple(
+    [
         "title",
         "machine",
         "experiment",
@@ -37,9 +37,17 @@ KEYS = (
         "quantile",
         "evaluations",
         "points",
-    ),
-    *("minimise", "report", "set", "search", "baseline", "parameters", "constraints", "vary"),
-    *("judge", "measures"),
+        "minimise",
+        "report",
+        "set",
+        "search",
+        "baseline",
+        "parameters",
+        "constraints",
+        "vary",
+        "judge",
+        "measures",
+    ]
 )
 MOST = 10_000
 """Maximum number of scenarios. Fewer than six have no 95 % interval of their median."""
