@@ -106,15 +106,12 @@ def _spectra(test: ThesisTrial) -> dict[str, Array]:
     return {**spectra, "frequencies": welch(test.plate[5000:], **options)[0][1:82]}
 
 
-def _chapter_7_band(configuration: Configuration) -> Configuration:
-    """Return a configuration with the road of chapter 7."""
-    return configuration._replace(road=ROAD_CHAPTER_7)
-
-
 def jobs(seeds: int) -> Mapping[str, Job]:
     """Return the jobs of the study; at most `MOST_SEEDS` seeds are used."""
     work: dict[str, Callable[[int], Result]] = {name: partial(_run, name) for name in TESTS}
-    work["road0.2-1.6"] = partial(_run, "road1.6", change=_chapter_7_band)
+    work["road0.2-1.6"] = partial(
+        _run, "road1.6", change=lambda usual: usual._replace(road=ROAD_CHAPTER_7)
+    )
     return seeded(work, min(seeds, MOST_SEEDS))
 
 

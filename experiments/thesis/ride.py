@@ -105,19 +105,15 @@ def job_result(test: ThesisTrial, seed: int) -> Result:
         result |= curves(test)
         result["asked damper"] = _damper(test)[::SHOWN]
         if test.ideal.wing is not None:
+            settings, period = test.configuration.controller, test.configuration.timing.period
             result |= {
-                "wing": 1e3 * _wing(test)[::SHOWN],
+                "wing": 1e3 * wing(settings, period, states_of(test))[::SHOWN],
                 "ideal wing": 1e3 * (test.ideal.wing - test.ideal.wing[:, :1])[::SHOWN],
             }
     # The history of the damper is drawn for one seed only; the others need not store it.
     elif "damping" in result:
         del result["damping"]
     return result
-
-
-def _wing(test: ThesisTrial) -> Array:
-    """Return the height of the beams' points above the centre, m, shape (ticks, points)."""
-    return wing(test.configuration.controller, test.configuration.timing.period, states_of(test))
 
 
 def _damper(test: ThesisTrial) -> Array:

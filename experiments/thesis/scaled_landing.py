@@ -113,11 +113,6 @@ def landings() -> tuple[list[Entry], Drawing, list[str]]:
     )
 
 
-def _rest() -> float:
-    """Return the compression of the aircraft's spring at rest, m."""
-    return equilibrium(BOEING.spring, BOEING.sprung_mass * BOEING.gravity)
-
-
 def _remarks(real: Scaling, slow: Scaling, off: float) -> list[str]:
     """Return the remarks on Tables 3.2 and 3.3 and on the pseudo-dynamic test."""
     area = math.pi / 4.0 * (BORE**2 - ROD**2)
@@ -132,6 +127,7 @@ def _remarks(real: Scaling, slow: Scaling, off: float) -> list[str]:
         UNITS, {"gas_force": real.factor("N"), "stroke": real.length, "time": slow.time}
     )
     # Without lift the full weight acts from touch-down on, as in the printed equation.
+    rest = equilibrium(BOEING.spring, BOEING.sprung_mass * BOEING.gravity)
     no_lift = float(np.max(touch_down(BOEING._replace(lift=0.0), INSTANTS)[0]))
     inside = float(np.max(touch_down(BOEING, INSTANTS)[0]))
     return [
@@ -141,7 +137,7 @@ def _remarks(real: Scaling, slow: Scaling, off: float) -> list[str]:
         "Gas spring: length, 24.7 MN/m and 76 % follow from 0.559 m, exponent 1.4 and three "
         "times the static load fully compressed; the text says 0.589 m and four times. No stroke "
         "gives the 3.79 MN/m at equilibrium: the closed form is "
-        f"{1e-6 * stiffness(BOEING.spring, _rest()):.2f} MN/m.",
+        f"{1e-6 * stiffness(BOEING.spring, rest):.2f} MN/m.",
         f"Pseudo-dynamic: {BOEING.velocity:g} m/s are {real.factor('m/s') * BOEING.velocity:.3f} "
         f"m/s on the rig; a time scale of {slow.time:.3f} brings them to "
         f"{Cylinder().speed_limit:g} m/s. Forces fall by its square: the gas charge from "

@@ -45,34 +45,10 @@ a model and a log, nothing else: rigtwin diagnose log.csv --machine arm.xml, doc
 """
 
 
-COMMANDS = tuple(
-    [
-        "list",
-        "run",
-        "session",
-        "card",
-        "faults",
-        "effects",
-        "info",
-        "plot",
-        "video",
-        "export",
-        "import",
-        "describe",
-        "calibrate",
-        "compare",
-        "diagnose",
-        "fit",
-        "look",
-        "watch",
-        "machines",
-        "machine",
-        "blindcheck",
-        "reproduce",
-        "tune",
-        "stability",
-        "rths",
-    ]
+COMMANDS = (
+    *("list", "run", "session", "card", "faults", "effects", "info", "plot", "video", "export"),
+    *("import", "describe", "calibrate", "compare", "diagnose", "fit", "look", "watch"),
+    *("machines", "machine", "blindcheck", "reproduce", "tune", "stability", "rths"),
 )
 """In the order of the help; each has a module of its name here."""
 

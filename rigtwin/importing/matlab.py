@@ -9,7 +9,7 @@ import numpy as np
 
 from rigtwin.errors import RigtwinError
 from rigtwin.importing.columns import Columns
-from rigtwin.importing.format import Format
+from rigtwin.importing.format import Format, first_line
 from rigtwin.importing.selection import Selection
 from rigtwin.numerics.arrays import Array
 
@@ -136,8 +136,7 @@ def _read_hdf(path: Path, selection: Selection) -> Columns:
 
 
 def _unreadable(path: Path, error: Exception) -> RigtwinError:
-    reason = (str(error).splitlines() or [type(error).__name__])[0]
-    return RigtwinError(f"{path} is not a MATLAB file, or damaged: {reason}")
+    return RigtwinError(f"{path} is not a MATLAB file, or damaged: {first_line(error)}")
 
 
 FORMAT = Format("MATLAB", (".mat",), read_matlab)

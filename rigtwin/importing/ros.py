@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from rigtwin.errors import RigtwinError
 from rigtwin.importing.columns import Columns
-from rigtwin.importing.format import Format
+from rigtwin.importing.format import Format, first_line
 from rigtwin.importing.ros_topics import Topic, decoder, list_columns, read_topic
 from rigtwin.importing.selection import Selection
 from rigtwin.importing.series import join_series
@@ -65,10 +65,8 @@ def read_bag(path: Path, selection: Selection) -> Columns:
     except (RigtwinError, MemoryError):
         raise
     except Exception as error:  # The reader raises errors of any kind for a damaged bag.
-        reason = (str(error).splitlines() or [type(error).__name__])[0]
-        hint = ""
-        if "profile" in reason.lower():
-            hint = "; a recording of rigtwin needs no import"
+        reason = first_line(error)
+        hint = "; a recording of rigtwin needs no import" if "profile" in reason.lower() else ""
         raise RigtwinError(f"{path} is not a ROS 2 bag, or damaged: {reason}{hint}") from None
 
 

@@ -6,8 +6,16 @@ from dataclasses import dataclass
 
 SIGNALS = ("ground_lvdt", "structure_lvdt", "suspension_lvdt", "load_cell")
 # A broken sensor first shows as a contradiction to another; which one depends on the motion.
-_IMPLAUSIBLE = tuple(
-    ["jump", "wheel", "motor", "following", "structure", "travel", "ground", "force", "velocity"]
+_IMPLAUSIBLE = (
+    "jump",
+    "wheel",
+    "motor",
+    "following",
+    "structure",
+    "travel",
+    "ground",
+    "force",
+    "velocity",
 )
 
 

@@ -26,28 +26,10 @@ from rigtwin.studies.tuning.study import Budget, Changes, Constraint, Goals, Stu
 
 BASELINE = "baseline"
 REQUIRED = ("experiment", "minimise", "parameters")
-KEYS = tuple(
-    [
-        "title",
-        "machine",
-        "experiment",
-        "from",
-        "roads",
-        "held_out",
-        "quantile",
-        "evaluations",
-        "points",
-        "minimise",
-        "report",
-        "set",
-        "search",
-        "baseline",
-        "parameters",
-        "constraints",
-        "vary",
-        "judge",
-        "measures",
-    ]
+KEYS = (
+    *("title", "machine", "experiment", "from", "roads", "held_out", "quantile", "evaluations"),
+    *("points", "minimise", "report", "set", "search", "baseline", "parameters"),
+    *("constraints", "vary", "judge", "measures"),
 )
 MOST = 10_000
 """Maximum number of scenarios. Fewer than six have no 95 % interval of their median."""
