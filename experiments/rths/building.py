@@ -106,6 +106,7 @@ def find_case(number: int) -> BuildingCase:
 def frequencies(case: BuildingCase) -> Array:
     """Return the natural frequencies of the whole building, Hz, ascending, shape (3,)."""
     # Generalised eigenvalues K φ = ω² M φ.
+    # The generalised eigenproblem K φ = ω² M φ; eigh returns ω² in ascending order.
     squares, _ = eigh(STIFFNESS, case.mass * np.eye(FLOORS))
     return np.sqrt(squares) / (2.0 * math.pi)
 

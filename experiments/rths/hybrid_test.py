@@ -274,6 +274,7 @@ def _loop(  # type: ignore[no-untyped-def]
     for tick in range(len(ground)):
         position = actuator[0] * units[0]
         true_force = actuator[2] * units[2]
+        # Noise enters before the converter rounds, as it does on the real hardware.
         measured = _rounded(position / METRES + noise[0, tick]) * METRES
         measured_force = _rounded(true_force / NEWTONS + noise[1, tick]) * NEWTONS
         if is_linear:

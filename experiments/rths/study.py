@@ -82,6 +82,8 @@ def _jobs(seeds: int) -> Mapping[str, Job]:
         # A compensator that fails in El Centro is not run with the other earthquakes.
         for quake in QUAKES if name in ("sample", BEST, *ADAPTIVE) else ("elcentro",):
             for case in CASES:
+                # One job for each combination, so that cores share the work and finished jobs are
+                # kept.
                 jobs[f"{name}/{quake}/{case}"] = partial(_robustness, case, quake, name)
     return jobs
 

@@ -249,10 +249,8 @@ def tune_compensator(
         1000.
     evaluations : int
         Largest number of evaluations of the criterion, 3 to 1000. Defaults to 60.
-    seed : int
-        Seed of the random plants. Defaults to 1.
-    progress : callable
-        Function called with 1 after every evaluation.
+    seed, progress : int, callable
+        Seed of the random plants, and function called with 1 after every evaluation.
 
     Returns
     -------

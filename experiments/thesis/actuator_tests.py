@@ -61,6 +61,8 @@ def _average_test(demanded: Callable[[Array, Settings], Array], seed: int) -> tu
     ran = simulate(configuration, demanded(time_of(configuration), configuration.controller), seed)
     second = round(1.0 / configuration.timing.period)
     commands, measured = (
+        # Averaging over periods lowers noise that is not periodic by √10, and leaves the
+        # response.
         part[-10 * second :].reshape(10, second, 4).mean(axis=0)
         for part in (ran.commands, ran.measurements)
     )
@@ -142,6 +144,8 @@ def fit_transfer_function(
     s = 2j * math.pi * frequencies / scale
     weight = np.ones(len(s))
     numerator, denominator = np.zeros(zeros + 1), np.zeros(poles + 1)
+    # Each iteration weights by the denominator of the one before, which turns the equation error
+    # N − H D back into the output error N/D − H.
     for _ in range(30):
         columns = [s**power for power in range(zeros, -1, -1)] + [
             -response * s**power for power in range(poles - 1, -1, -1)
@@ -173,6 +177,7 @@ def press_tyre(seed: int) -> Result:
         controller=settings, timing=Timing(duration=40.0), safety=Safety(force=1700.0)
     )
     time = time_of(configuration)
+    # A raised cosine: slow at both ends, where loading turns into unloading.
     force = 200.0 + 1200.0 * (0.5 - 0.5 * np.cos(2 * math.pi * time / 40.0))
     demands = np.column_stack([np.zeros_like(time), np.full_like(time, settings.start), force])
     ran = simulate(configuration, demands, seed)
@@ -187,6 +192,7 @@ def ramp_force(direction: float, seed: int) -> Result:
     settings = Settings(mode=Mode.IMPOSED)
     configuration = Configuration(controller=settings, timing=Timing(duration=10.0))
     time = time_of(configuration)
+    # 10 N/s: slow against the force loop, so that the force at breakaway is static.
     force = 200.0 + direction * np.maximum(10.0 * (time - 1.0), 0.0)
     demands = np.column_stack([np.zeros_like(time), np.full_like(time, settings.start), force])
     ran = simulate(configuration, demands, seed)

@@ -77,6 +77,7 @@ def _a2_1() -> tuple[LocusCase, ...]:
 def _a2_2() -> tuple[LocusCase, ...]:
     """Return the cases of Table A2.2: the sprung natural frequency is swept."""
     cases = []
+    # In structure MIL only the body moves with a lag, so the wheel hop follows its ideal longer.
     for number, ratio, lag, figure in OF_STIFFNESS:
         name, variations = f"A2.{figure}", SLOW if lag == 0.2 else QUICK
         # The thesis compares structure MIL with suspension MIL over the same sweep.

@@ -22,6 +22,7 @@ def modes_drawing(settings: Settings) -> Drawing:
     model = modes(settings, 1e-3)
     distance = settings.beam_length * np.arange(BEAMS + 1)
     for number in range(4):
+        # Shapes have no scale of their own; the largest deflection is drawn as 1.
         shape = model.wing[number] / np.abs(model.wing[number]).max()
         label = f"{model.frequencies[number]:.2f} Hz"
         # Opposite arms move alike in a mode that the centre feels; the centre itself counts once.
@@ -47,6 +48,7 @@ def modes_drawing(settings: Settings) -> Drawing:
             centre = shapes[HEAVE]
         else:
             angular, centre = 2 * math.pi * model.frequencies[:count], model.centre[:count]
+        # The sum of modal compliances, φ² / (s² + β ω² s + ω²), at s = j 2π f.
         parts = centre[:, None] ** 2 / (
             s**2 + settings.beam_damping * angular[:, None] ** 2 * s + angular[:, None] ** 2
         )

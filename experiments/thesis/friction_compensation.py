@@ -128,6 +128,7 @@ def _calibrated(loop: str, count: int) -> Result:
 
 def jobs(seeds: int) -> Mapping[str, Job]:
     """Return the jobs of the study; at most `MOST_SEEDS` seeds are used."""
+    # Each seed stands for a test of every variant, so few seeds have to do.
     count = min(seeds, MOST_SEEDS)
     work: dict[str, Job] = {
         f"calibrated-{loop}": (lambda loop=loop: _calibrated(loop, count)) for loop in LOOPS
@@ -162,6 +163,7 @@ def _tables(results: Mapping[str, Result]) -> list[Entry]:
         for error, text in zip(ERRORS, printed, strict=True):
             note = "printed `A1.184`; its row sums to 5.404" if text == "5.404" else ""
             entry = factor("Table 4.1", f"{row}: {error}", text, errors[error], "N", WITHIN, note)
+            # A note is a reason for a difference; an entry that agrees needs none.
             entries.append(entry if entry.agrees or note else replace(entry, note=NOISE))
     for name, printed in TABLE_4_2.items():
         row = name if name == "none" else f"{name} 4"

@@ -175,6 +175,7 @@ def sine_test(frequency: float, amplitude: float, seconds: float) -> tuple[Confi
 
     frequency: Hz; amplitude: of the plate itself, m; seconds: length of the test.
     """
+    # Imposed motion: no vehicle model closes a loop, so the reversals come when they are due.
     settings = Settings(
         mode=Mode.IMPOSED, filter_force=0.004, filter_velocity=0.0064, filter_position=0.004
     )._replace(**LOOPS["fitted"])
@@ -201,6 +202,7 @@ def detect_reversals(
     ran = simulate(configuration, demands, seed)
     period = configuration.timing.period
     # The detector runs over the recorded signals, so its steps do not change the motion.
+    # One step suffices to detect: the second step of two follows by itself.
     tuned = configuration.controller._replace(compensator=Compensator.ONE_STEP, **settings)
     steps = detections(
         tuned, ran.measurements[:, 2], ran.commands[:, 2], ran.measurements[:, 3], period

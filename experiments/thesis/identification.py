@@ -48,6 +48,7 @@ def jobs(seeds: int) -> Mapping[str, Job]:
         {"cylinder": response(cylinder_response), "force": response(force_response)},
         min(seeds, MOST_SEEDS),
     )
+    # The static tests are slow sweeps, in which neither noise nor seed matters.
     work_by_key["tyre"] = lambda: press_tyre(0)
     return work_by_key | {
         "rail/up": lambda: ramp_force(1.0, 0),
@@ -136,6 +137,7 @@ def _deviation(ratio: Response) -> tuple[float, float, str]:
 
 def _bandwidths() -> list[Entry]:
     """Return the entries of the bandwidths that §3.3 quotes, from the printed equations."""
+    # Fine enough that the interpolation error of a bandwidth, 0.01 Hz, does not show.
     fine = np.linspace(0.1, 40.0, 4000)
     loop = _crossing(fine, _decibel(thesis_force_loop(fine)), -3.0)
     cylinder = _crossing(fine, _decibel(thesis_cylinder(fine)), -3.0)

@@ -48,6 +48,8 @@ def becomes_unstable(*modes: str) -> Judge:
     def judge(locus: Locus) -> tuple[bool, str]:
         start, end = unstable_at_ends(locus)
         crossed = {crossing.mode for crossing in locus.crossings}
+        # All three: a mode that was unstable at the start has not become so, and one that is
+        # stable again at the end is not unstable.
         return bool(not start and end and crossed == set(modes)), describe_crossings(locus)
 
     return judge

@@ -158,6 +158,7 @@ def _reaches(spring: GasSpring, wanted: float) -> float:
 
     The stiffness k = γ F L^γ / (L − x)^(γ + 1) is solved for x.
     """
+    # Differentiating F = F_0 (L/(L − x))^γ gives k = γ F_0 L^γ (L − x)^−(γ+1).
     constant = spring.exponent * spring.force * spring.length**spring.exponent
     return spring.length - (constant / wanted) ** (1.0 / (spring.exponent + 1.0))
 

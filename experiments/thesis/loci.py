@@ -195,6 +195,7 @@ def locus(model: str, variation: LocusVariation) -> Locus:
 
     Loci are cached, because several judges compare a locus with others.
     """
+    # Equal ratios, since a sweep spans up to seven decades.
     values = np.logspace(math.log10(variation.start), math.log10(variation.end), POINTS)
     return Locus(model, values, variation.at)
 

@@ -223,6 +223,7 @@ def _lag_entries() -> list[Entry]:
 
 def _friction_entries(results: Mapping[str, Result]) -> list[Entry]:
     """Return the entries of limit cycle, wheel and drift: the traces of friction in §6.3."""
+    # Medians over the seeds, as single tests differ by their noise.
     swing, hop_rms, ideal_hop = (
         _median(results, "drop", key) for key in ("swing at rest", "hop", "ideal hop")
     )

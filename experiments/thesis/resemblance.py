@@ -149,6 +149,7 @@ def undamped_at_boundary(locus: Locus) -> tuple[bool, str]:
         ideal_single_mass(car.sprung) if locus.model == "single-mass" else ideal_quarter_car(car)
     )
     expected = sorted(pole.imag for pole in poles(undamped) if pole.imag > 0.0)
+    # Sorted on both sides, because the order of crossings along the sweep says nothing here.
     crossed = sorted(crossing.frequency for crossing in locus.crossings)
     # At the boundary the lag cancels the damping, so the vehicle swings as if undamped.
     holds = len(crossed) == len(expected) and bool(np.allclose(crossed, expected, rtol=1e-6))

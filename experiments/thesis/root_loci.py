@@ -64,6 +64,7 @@ def _tables() -> list[Entry]:
         entries.append(_ratio(f"Table {appendix}.3"))
         for table, variation in (("4", TYRES[PRINTED_LAG]), ("5", WHEELS[PRINTED_LAG])):
             # A lag above the critical one of every value contradicts the printed statements.
+            # A stable value of the sweep must have a critical lag above the printed one.
             largest = _largest_critical(model, variation)
             entries.append(
                 statement(

@@ -55,6 +55,7 @@ def mapped_back(landing: Landing, scale: Scaling, instants: Array) -> Array:
 
     The simulation runs at the size and pace of the rig. instants: times in full size, s.
     """
+    # Position, velocity and force have scales of their own, and time another.
     factors = np.array([scale.factor(unit) for unit in ("m", "m/s", "N")])
     return touch_down(landing, instants * scale.time) / factors[:, None]
 

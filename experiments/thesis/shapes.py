@@ -148,6 +148,7 @@ def far_left(count: int) -> Judge:
     """Return a judge: `count` poles start far left, at ten times the largest ideal magnitude."""
 
     def judge(locus: Locus) -> tuple[bool, str]:
+        # Ten times the fastest ideal pole: the filter has decayed before the vehicle moves.
         limit = -10.0 * np.abs(locus.ideal[0]).max()
         far_poles = np.sort(locus.poles[0].real[locus.poles[0].real < limit])
         return len(far_poles) == count, f"{len(far_poles)}: {format_numbers(far_poles)} 1/s"

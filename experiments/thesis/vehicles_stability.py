@@ -130,6 +130,7 @@ def _entries(cars: Mapping[str, QuarterCar]) -> list[Entry]:
                     where, f"{name}, four lags of 10 ms", "unstable", pole.real > 0.0, words, note
                 )
             )
+    # Real part of the rightmost pole: the rate at which the fastest mode grows.
     rates = {name: growth(car).real for name, car in cars.items()}
     slow = (rates["car, 40 kg wheel"], rates["motorcycle"])
     words = ", ".join(f"{name} {rate:+.3g} 1/s" for name, rate in rates.items())

@@ -219,6 +219,7 @@ def what_changed(
     >>> changes = rigtwin.what_changed(["monday.mcap", "friday.mcap"])  # doctest: +SKIP
     >>> [parameter.name for parameter in changes.changed]  # doctest: +SKIP
     """
+    # The order is kept: it is the order of time, in which a change is looked for.
     loaded = [resolve_recording(recording) for recording in _as_list(recordings)]
     if _has_duplicate(loaded):
         raise RigtwinError("a recording is named twice; expected different recordings")

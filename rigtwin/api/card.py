@@ -132,6 +132,7 @@ def serve_card(
     actual = apply_effects(configuration, effect_texts(effects))
     table = load_table(Path(card), described.physics.signals(described))
     terminals = described.physics.terminals(described, actual, table, seed)
+    # In real time, since its clients run on clocks of their own.
     virtual = VirtualCard(terminals, table, RealTime(configuration.timing.period))
     server, open_port = serve(virtual, port)
     return ServedCard(

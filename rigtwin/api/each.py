@@ -78,6 +78,7 @@ class _Job:
 def _answer(job: _Job) -> dict[str, Any]:
     """Diagnose one recording. Runs in a worker process."""
     with TemporaryDirectory(prefix="rigtwin-") as folder:
+        # The job carries the content, since workers on other computers do not have the file.
         path = Path(folder) / _PLACEHOLDER
         path.write_bytes(job.data)
         try:
@@ -235,6 +236,7 @@ def _read(path: Path, result: Any, store: Path) -> Answered:
     try:
         if "error" in result:
             return Answered(path, None, result["error"].replace(_PLACEHOLDER, printable(str(path))))
+        # Escaped as inside a JSON text, because it is put into one.
         escaped = json.dumps(printable(str(path)))[1:-1]
         document = json.loads(result["answer"].replace(_PLACEHOLDER, escaped))
         _ = document["verdict"], document["sentence"]

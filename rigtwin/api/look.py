@@ -107,6 +107,7 @@ def show_look(
     with _needs_viser():
         from rigtwin.looking.local_server import open_server
         from rigtwin.looking.page import Page
+    # Opened last: everything that can be refused has been by now.
     server = open_server(port, f"{look.machine.title}: {look.recording.path.name}")
     return Page(server, look, start, _twin_file(look.recording.path, save_twin))
 

@@ -85,6 +85,7 @@ def machine_of(recording: reader.Recording) -> Machine:
     RigtwinError
         If none of these exists, so that the machine has to be stated.
     """
+    # Only recordings of this API carry a machine; those of the reader below it do not.
     described = getattr(recording, "described", None)
     if described is not None:
         return described

@@ -156,5 +156,6 @@ def _resolve_experiment(machine: Machine, experiment: str | Experiment | Demandi
         return experiment
     if not callable(experiment):
         raise RigtwinError(f"experiment {experiment!r:.60}: expected a name, or a function")
+    # An object, or a partial function, has no name of its own.
     name = getattr(experiment, "__name__", "own")
     return Experiment(name, "", "", machine.configuration, experiment)

@@ -101,6 +101,7 @@ def tune(
     step = count_steps(progress, count_runs(loaded, posterior))
     with open_workers(workers, cluster) as open_, Store(folder / RUNS) as store:
         result = tune_study(Bench(loaded, store, open_, step), seed, posterior, stage)
+    # The recording of the result is of the likeliest rig, not of the nominal one.
     tuned_on = loaded.configuration
     write(folder, result, tuned_on if posterior is None else posterior.at_best(tuned_on))
     return result

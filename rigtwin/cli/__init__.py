@@ -65,6 +65,7 @@ def _module(command: str) -> ModuleType:
 
 
 def _parser() -> argparse.ArgumentParser:
+    # The examples in the descriptions are laid out by hand, and must not be wrapped.
     form = argparse.RawDescriptionHelpFormatter
     top = argparse.ArgumentParser(prog="rigtwin", description=OVERVIEW, formatter_class=form)
     top.add_argument("--version", action="store_true", help="print the version and stop")

@@ -110,6 +110,7 @@ def execute(parsed: argparse.Namespace) -> int:
 
     if parsed.each is not None:
         return _diagnose_each(parsed)
+    # They would silently do nothing otherwise.
     if parsed.workers is not None or parsed.cluster is not None:
         raise RigtwinError("--workers and --cluster: of --each; one diagnosis uses all cores")
     begun = time.perf_counter()

@@ -116,6 +116,7 @@ def execute(parsed: argparse.Namespace) -> int:
         _write(parsed.out, said, rows, list(campaign.failed))
     if parsed.json is not None:
         write_json(parsed.json, [asdict(result) for result in campaign.results])
+    # A session that was not run proves nothing, so it counts as one that failed.
     return 0 if not campaign.failed and not campaign.undone else 4
 
 
@@ -157,6 +158,7 @@ def _write(
         old = path.read_text(encoding="utf-8") if path.is_file() else ""
     except (OSError, UnicodeDecodeError):
         raise RigtwinError(f"cannot read {path}, whose table is to be replaced") from None
+    # A page may hold text before the mark, which is kept; what follows is replaced.
     before, mark, _ = old.partition(MARK)
     table_only = "\n".join(lines) + "\n"
     atomic_write(path, f"{before}{MARK}\n\n{table_only.rstrip()}\n" if mark else table_only)

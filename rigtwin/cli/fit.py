@@ -61,6 +61,7 @@ def execute(parsed: argparse.Namespace) -> int:
 
     import rigtwin
 
+    # Before the fit, which takes longer than a mistake is worth.
     for out in (parsed.json, parsed.save_mjcf):
         if out is not None:
             writable(out)

@@ -54,6 +54,7 @@ def execute(parsed: argparse.Namespace) -> int:
 
     if parsed.live and parsed.diagnosis is not None:
         raise RigtwinError("--diagnosis is of a recording that is whole; not with --live")
+    # The name is settled here, so that the page and the check below mean the same file.
     out = parsed.save_twin or Path(f"{parsed.recording.stem}_twin.toml")
     writable(
         forbid_overwriting(

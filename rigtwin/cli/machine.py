@@ -83,6 +83,7 @@ def execute(parsed: argparse.Namespace) -> int:
         print(f"not taken into account: {line}")
     # Flushed: what follows takes up to 20 s.
     print("no mistakes", flush=True)
+    # Last, because it takes longest and everything else is known without it.
     _print_never(machine, math.inf if parsed.identifiability else ALLOWED)
     return 0
 

@@ -62,6 +62,7 @@ def execute(parsed: argparse.Namespace) -> int:
 
     machine = rigtwin.machine(parsed.machine)
     experiment = find_experiment(machine, parsed.name)
+    # Without a name no recording is overwritten; a stated name may be.
     path = parsed.out or _fresh(f"{experiment.name}-{parsed.seed}")
     if parsed.seed < 0:
         raise RigtwinError(f"--seed {parsed.seed}: expected 0 or more")

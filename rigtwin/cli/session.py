@@ -142,6 +142,7 @@ def _compare(path: Path, machine: str | None = None) -> None:
     """Says where the rig and the twin disagree, at once."""
     from rigtwin.cli.compare import execute as compare
 
+    # The options that `rigtwin compare` would have parsed.
     defaults = {"other": None, "json": None, "machine": machine, "config": None}
     try:
         compare(argparse.Namespace(recording=path, effect=[], set=[], **defaults))

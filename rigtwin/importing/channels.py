@@ -70,6 +70,7 @@ def make_channels(label: str, columns: Columns, wanted: Map) -> Imported:
         # Order matters: repeats and the stretch are settled before the period is, since rows
         # outside the stretch may be irregular; numbers are required only within it.
         time, signals = drop_repeats(time, signals, report)
+        # Start and end count from the first row, whatever clock the stamps are of.
         taken = (time - time[0] >= wanted.start) & (time - time[0] <= wanted.until)
         if taken.sum() < 2:
             raise RigtwinError(
@@ -119,6 +120,7 @@ def find_column(columns: Columns, name: str) -> Array:
 def _signal(columns: Columns, name: str, asked: Column, report: list[str]) -> Array:
     """Return a column in SI, shape (rows,)."""
     values = find_column(columns, asked.name)
+    # The map's unit wins: its author has seen the file, and may know that the file's is wrong.
     said = asked.unit if asked.unit is not None else columns.units.get(asked.name, "1")
     try:
         _, factor = unit_of(said)

@@ -112,6 +112,7 @@ def convert_episodes(
         out = folder / f"{data[0].stem if _are_paths(data) else 'recording'}{ENDING}"
         return (Written(out, tuple(convert(data, mapping, out, machine))),)
     described = _machine(wanted, machine)
+    # The header says what the whole file holds, so it is made once.
     header, done, errors = _header(label, columns), [], []
     for episode in episodes:
         out = folder / f"{episode.name}{ENDING}"
@@ -126,6 +127,7 @@ def convert_episodes(
             lines = [f"episode {episode.number}: {each}" for each in (*imported.report, line)]
             done.append(Written(out, tuple(lines)))
     if not done:
+        # Nothing could be converted: the first reason stands for all.
         raise errors[0]
     return tuple(replace(each, report=(*header, *each.report)) for each in done)
 

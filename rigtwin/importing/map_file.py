@@ -114,6 +114,7 @@ def _number(where: str, value: object, low: float = -math.inf, high: float = mat
 def _map(document: Mapping[str, Any]) -> Map:
     _require_keys("the map", document, TABLES)
     machine = document.get("machine")
+    # A recording without a machine could not be compared with any twin.
     if not isinstance(machine, str) or not machine:
         raise RigtwinError(
             "machine is missing; expected the name that its description has, "
@@ -183,6 +184,7 @@ def _episodes(entry: object) -> tuple[str | None, tuple[int, ...]]:
     # type() rather than isinstance: true is an int in Python.
     if not isinstance(take, list | tuple) or not all(type(number) is int for number in take):
         raise RigtwinError(f"[episodes] take = {take}: expected a list of whole numbers")
+    # Repeated numbers would make recordings of one name.
     return column, tuple(dict.fromkeys(take))
 
 

@@ -170,6 +170,7 @@ class PosedMachine:
             # The camera turns about the point nearest to the machine's centre on its line of sight.
             ahead = max(float(forward @ (centre - place)), 0.1 * float(statistic.extent))
             return place, place + ahead * forward, _widen(self._model.cam_fovy[0])
+        # From the side, in front and above, at a distance that shows the whole machine.
         aside = statistic.extent * np.array([0.7, -1.4, 0.7])
         return centre + aside, centre, _widen(self._model.vis.global_.fovy)
 
@@ -192,6 +193,7 @@ def _triangles(model: mujoco.MjModel, number: int) -> trimesh.Trimesh | None:
     if kind == geom.mjGEOM_SPHERE:
         return make.icosphere(subdivisions=BALL, radius=float(size[0]))
     if kind == geom.mjGEOM_ELLIPSOID:
+        # A unit ball stretched along its three axes.
         return make.icosphere(subdivisions=BALL).apply_scale(size)
     if kind == geom.mjGEOM_CYLINDER:
         return make.cylinder(radius=float(size[0]), height=2.0 * float(size[1]))

@@ -196,6 +196,7 @@ def _renderer(
     # The context must be current before MuJoCo uploads its textures and meshes.
     data = mujoco.MjData(model)
     context = _context()
+    # MuJoCo allocates the offscreen buffer at this size, 640 x 480 by default.
     model.vis.global_.offwidth, model.vis.global_.offheight = WIDTH, SCENE_HEIGHT
     drawing = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_150)
     mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, drawing)
