@@ -90,6 +90,7 @@ def _tests() -> Iterator[Experiment]:
 
 def _compensated(plain: Experiment) -> Experiment:
     """Return a test with the delay of the plate compensated."""
+    # The remark on stability holds for the plain test alone.
     summary = plain.summary.removesuffix(": unstable on this rig")
     return replace(
         plain,

@@ -91,6 +91,8 @@ def ride_measures(test: ThesisTrial) -> dict[str, Array | float]:
     if test.configuration.controller.skyhook == Skyhook.SEMI_ACTIVE:
         coefficient = damping(test)
         # A switch is a change between the lowest coefficient and a higher one.
+        # Equality within rounding is safe here, because the damper is clipped to its minimum
+        # exactly.
         at_least = coefficient <= test.configuration.controller.damping_min
         result["switches"] = float(np.sum(np.diff(at_least.astype(int)) != 0) / test.time[-1])
         result["damping"] = coefficient[::SHOWN]

@@ -72,6 +72,7 @@ def _equation_6() -> list[Entry]:
     """Return the entries of the dimensionless groups (Eq. 3.6) and the scale factors (Eq. 3.8)."""
     # Repeating variables stand for mass, length and time, as in the thesis.
     groups = pi_groups(VARIABLES, ("m_s", "x_s", "t"))
+    # The groups in the order of the variables, as the thesis lists them.
     ours = ", ".join(str(group) for group in groups)
     printed = (
         {"m_u": 1, "m_s": -1},

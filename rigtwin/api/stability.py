@@ -53,6 +53,7 @@ def stability(
         if name not in QuarterCar._fields:
             known = ", ".join(QuarterCar._fields)
             raise RigtwinError(f"unknown parameter {name!r} of a vehicle; there are {known}")
+    # Checked after the changes, which may leave the plausible range as well.
     car = check_plausible(car._replace(**(changes or {})))
     return judge(car, check_time("tau", tau), delay)
 

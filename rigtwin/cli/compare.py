@@ -44,6 +44,7 @@ def execute(parsed: argparse.Namespace) -> int:
                 "--set, --config and --effect change the twin; "
                 "two recordings are compared without one"
             )
+        # Its own machine is not asked for: `compare_recordings` refuses different ones.
         second = rigtwin.load(parsed.other)
         results, differences = rigtwin.compare_recordings(recording, second)
         notes = (*recording.notes, *second.notes, *differences)

@@ -56,6 +56,7 @@ def split_episodes(columns: Columns, column: str, take: Sequence[int]) -> Iterat
         If a row has no whole number of an episode, or an episode to take does not exist.
     """
     numbers = columns.values[column]
+    # Numbers of episodes come as floats, like all columns.
     if (odd := ~(np.floor(numbers) == numbers)).any():
         row = int(np.argmax(odd))
         raise RigtwinError(

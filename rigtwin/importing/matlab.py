@@ -61,6 +61,7 @@ def _flatten(name: str, value: Any) -> dict[str, Array]:
     array = np.asarray(value)
     if array.dtype.kind not in NUMBERS:
         return {}
+    # Vectors are matrices in MATLAB, with one axis of length 1.
     array = np.squeeze(array)
     return {
         column: _take(array, number) for column, number in _name_columns(name, array.shape).items()

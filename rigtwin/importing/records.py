@@ -108,6 +108,7 @@ def _of_cells(cells: Mapping[str, Sequence[Any]], form: str, notes: tuple[str, .
 
 
 def _cell(value: Any) -> str:
+    # True as text would be a word, while a signal of truth values is 0 and 1.
     return str(float(value)) if isinstance(value, bool) else str(value)
 
 

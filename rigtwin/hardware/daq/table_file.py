@@ -33,6 +33,7 @@ def find_table(path: Path) -> Path:
     """
     if path.exists():
         return path
+    # The shipped tables are beside the machines that they are wired to.
     folder = Path(str(files("machines"))) / "cards"
     shipped = {each.stem.replace("_", "-"): each for each in sorted(folder.glob("*.toml"))}
     name = path.name.removesuffix(".toml").replace("_", "-")

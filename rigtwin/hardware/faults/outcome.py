@@ -113,6 +113,7 @@ def judge(fault: InjectedFault, test: Test, bench: FaultyBench, path: Path) -> F
         or SIGNALS[fault.place] in reason
     )
     right = named and (cause in fault.kind.causes or (harmless and shown < 0))
+    # Since the fault: before it, a hard test may come near its limits by itself.
     exceeded = bench.peak_share(test.card_configuration.safety, fault.at)
     return FaultResult(
         fault,

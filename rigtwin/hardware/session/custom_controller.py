@@ -71,6 +71,7 @@ def make_tick(controller: CustomController, configuration: Configuration) -> Cal
     try:
         made: Any = controller.make(configuration)
     except Exception as error:
+        # An error's text may have several lines; a message has one.
         reason = " ".join(f"{type(error).__name__}: {error}".split())
         raise RigtwinError(
             f"controller {controller.identity}: it cannot be made: {reason}"

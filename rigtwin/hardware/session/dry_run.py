@@ -56,6 +56,7 @@ def has_passed(card: Path, key: str) -> bool:
 def add_dry_run(card: Path, key: str, entry: Mapping[str, str]) -> None:
     """Add a completed dry run to the list. Raise RigtwinError if it cannot be written."""
     path = ledger(card)
+    # An entry of the same session is renewed; all others stay.
     entries = {**_entries(path), key: dict(entry)}
     # The list is replaced as a whole, so that a crash leaves the old one intact.
     temporary = path.with_suffix(".json.new")

@@ -117,6 +117,8 @@ def _plot_points(axis: Axes, result: TuningResult) -> None:
         axis.annotate(number, (x.median, y.median), fontsize=8, **place)
     axis.axhline(0.0, color=NEUTRAL, linewidth=0.8)
     axis.axvline(0.0, color=NEUTRAL, linewidth=0.8)
+    # A change is in percent where all scenarios have positive figures, else in the measure's
+    # unit.
     labels = []
     for measure in (first, second):
         relative = any(point.change_of(measure.name).relative for point in compared)
