@@ -120,10 +120,10 @@ def find_identifiable(
             progress(f"{effect.name}, {number} of {len(searched)}")
             responses[effect.name] = trial.response(effect)
     except _OutOfTime:
-        left = tuple(effect.name for effect in searched if effect.name not in responses)
+        remaining = tuple(effect.name for effect in searched if effect.name not in responses)
         unseen = tuple(name for name, shape in responses.items() if shape is None)
         seen = tuple(name for name, shape in responses.items() if shape is not None)
-        return Identifiability((), unseen, {}, motions, sums, (*seen, *left))
+        return Identifiability((), unseen, {}, motions, sums, (*seen, *remaining))
     unseen = tuple(name for name, shape in responses.items() if shape is None)
     shapes = {name: shape for name, shape in responses.items() if shape is not None}
     effects = {effect.name: effect for effect in searched if effect.name in shapes}
