@@ -22,7 +22,7 @@ from experiments import EXPERIMENTS
 from rigtwin.description.changes import from_assignments
 from rigtwin.hardware.daq import CARD
 from rigtwin.hardware.daq.card import Card
-from rigtwin.hardware.daq.table import load_table
+from rigtwin.hardware.daq.table_file import load_table
 from rigtwin.hardware.daq.terminals import Terminals
 from rigtwin.hardware.daq.virtual import Response, VirtualCard
 from rigtwin.hardware.daq.wired import InRealTime, WiredTwin

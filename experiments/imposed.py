@@ -28,6 +28,7 @@ def multisines(configuration: Configuration, seed: int) -> Array:
     # not use up the cylinders' speed limit.
     time, random = time_of(configuration), random_of(seed)
     ground = multisine(time, 0.2, 10.0, 0.1, 1.0, 0.005, random)
+    # About the start position, where the test is ramped to; the ground starts at zero.
     structure = configuration.controller.start + multisine(time, 0.2, 10.0, 0.1, 1.0, 0.009, random)
     force = FORCE_MEAN + multisine(time, 0.3, 30.0, 0.1, 0.5, 35.0, random)
     return np.column_stack([ground, structure, force])

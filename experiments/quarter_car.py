@@ -15,6 +15,7 @@ from rigtwin.simulation.experiment import Experiment
 PASSIVE = Settings()
 SEMI_ACTIVE = Settings(skyhook=Skyhook.SEMI_ACTIVE, skyhook_damping=200.0)
 ACTIVE = Settings(skyhook=Skyhook.ACTIVE, skyhook_damping=200.0)
+SUSPENSIONS = {"passive": PASSIVE, "semi-active": SEMI_ACTIVE, "active": ACTIVE}
 
 # Roads of §6.3.2, §6.3.3 and §7.1: the speed, m/s, and the band at that speed, Hz. A road of
 # spectral lines `spacing` apart repeats after 1/spacing, in s.
@@ -30,6 +31,7 @@ GAS = GasSpring(force=120.0, length=0.5, exponent=1.2)
 A stiffer gas spring is unstable with the rig's delays.
 """
 ON_GAS = Settings(
+    # The preload of 100 N and the gas spring's 120 N press the tyre of 50 kN/m together.
     start=-220.0 / 50_000.0,
     preload=100.0,
     suspension_stiffness=300.0,
@@ -75,11 +77,7 @@ EXPERIMENTS = (
             Configuration(controller=settings, timing=_LONG, road=ROAD_CHAPTER_7),
             road_ground,
         )
-        for name, settings in (
-            ("passive", PASSIVE),
-            ("semi-active", SEMI_ACTIVE),
-            ("active", ACTIVE),
-        )
+        for name, settings in SUSPENSIONS.items()
     ),
     *(
         Experiment(
@@ -93,10 +91,6 @@ EXPERIMENTS = (
             ),
             road_ground,
         )
-        for name, settings in (
-            ("passive", PASSIVE),
-            ("semi-active", SEMI_ACTIVE),
-            ("active", ACTIVE),
-        )
+        for name, settings in SUSPENSIONS.items()
     ),
 )

@@ -14,6 +14,7 @@ from rigtwin.simulation.experiment import Experiment
 # Table 3.4, with the three filter lags of §3.6 in s.
 CHAPTER_3 = Settings(
     travel=Travel.GROUND,
+    # Static deflection of the tyre, F/k_t, as on the quarter car.
     start=-220.0 / 50_000.0,
     suspension_stiffness=350.0,
     suspension_damping=30.0,

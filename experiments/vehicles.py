@@ -74,11 +74,7 @@ def _tests() -> Iterator[Experiment]:
     for name, vehicle in VEHICLES.items():
         dropped = configuration(vehicle)
         yield Experiment(
-            name,
-            f"{name} dropped: unstable on this rig",
-            "thesis Table 6.1",
-            dropped,
-            flat_ground,
+            name, f"{name} dropped: unstable on this rig", "thesis Table 6.1", dropped, flat_ground
         )
         yield Experiment(
             f"{name}-road10",
@@ -94,6 +90,7 @@ def _tests() -> Iterator[Experiment]:
 
 def _compensated(plain: Experiment) -> Experiment:
     """Return a test with the delay of the plate compensated."""
+    # The remark on stability holds for the plain test alone.
     summary = plain.summary.removesuffix(": unstable on this rig")
     return replace(
         plain,
@@ -141,6 +138,7 @@ def find_vehicle(name: str) -> QuarterCar:
             settings.sprung_mass,
         )
     }
+    # Table 6.1 has no tyre damping, as in `configuration`.
     for vehicle_name, vehicle in VEHICLES.items():
         cars[vehicle_name] = QuarterCar(tyre_damping=0.0, **vehicle._asdict())
     if name not in cars:

@@ -21,12 +21,9 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from rigtwin.api.answers import (
         Changes,
-        Comparison,
         Diagnosis,
         FirstLook,
         calibrate,
-        compare,
-        compare_recordings,
         diagnose,
         what_changed,
     )
@@ -38,14 +35,15 @@ if TYPE_CHECKING:
         serve_card,
         write_table,
     )
+    from rigtwin.api.comparing import Comparison, compare, compare_recordings
     from rigtwin.api.describing import Described, describe
     from rigtwin.api.each import Answered, diagnose_each
     from rigtwin.api.energy import EnergyError, energy_error
     from rigtwin.api.faults import Campaign, faults
     from rigtwin.api.fitting import EffectFit, fit
+    from rigtwin.api.importing import import_data, import_episodes
     from rigtwin.api.look import look, show_live, show_look
     from rigtwin.api.machines import (
-        Configuration,
         Effect,
         Experiment,
         Machine,
@@ -55,36 +53,26 @@ if TYPE_CHECKING:
         machine,
         machines,
     )
-    from rigtwin.api.recordings import Recording, import_data, import_episodes, load
+    from rigtwin.api.planning import plan_test
+    from rigtwin.api.recordings import Recording, load
     from rigtwin.api.running import run
-    from rigtwin.api.session import (
-        DryRun,
-        SessionResult,
-        dry_run,
-        plan_test,
-        run_on_card,
-        run_on_twin,
-        run_session,
-    )
+    from rigtwin.api.session import run_session
+    from rigtwin.api.stability import ModelStability, RigMargin, Stability, rig_margin, stability
     from rigtwin.api.studies import (
         HybridTest,
         Identifiability,
-        ModelStability,
         Reproduction,
-        RigMargin,
-        Stability,
         TunedCompensator,
-        TuningResult,
         blindcheck,
         blindcheck_machines,
         identifiability,
         reproduce,
-        rig_margin,
         rths,
-        stability,
-        tune,
         tune_compensator,
     )
+    from rigtwin.api.supervised import DryRun, SessionResult, dry_run, run_on_card, run_on_twin
+    from rigtwin.api.tuning import TuningResult, tune
+    from rigtwin.api.twin import Configuration
     from rigtwin.api.watching import Alarm, Suspect, Watch, watch
 
 __all__ = [
@@ -161,7 +149,6 @@ __all__ = [
 ]
 _MODULES = {
     "machines": (
-        "Configuration",
         "Effect",
         "Experiment",
         "Machine",
@@ -171,24 +158,19 @@ _MODULES = {
         "machine",
         "machines",
     ),
-    "recordings": (
-        "Recording",
-        "import_data",
-        "import_episodes",
-        "load",
-    ),
+    "twin": ("Configuration",),
+    "recordings": ("Recording", "load"),
+    "importing": ("import_data", "import_episodes"),
     "running": ("run",),
     "answers": (
         "Changes",
-        "Comparison",
         "Diagnosis",
         "FirstLook",
         "calibrate",
-        "compare",
-        "compare_recordings",
         "diagnose",
         "what_changed",
     ),
+    "comparing": ("Comparison", "compare", "compare_recordings"),
     "describing": ("Described", "describe"),
     "each": ("Answered", "diagnose_each"),
     "card": (
@@ -203,32 +185,33 @@ _MODULES = {
     "faults": ("Campaign", "faults"),
     "fitting": ("EffectFit", "fit"),
     "look": ("look", "show_live", "show_look"),
-    "session": (
+    "planning": ("plan_test",),
+    "supervised": (
         "DryRun",
         "SessionResult",
         "dry_run",
-        "plan_test",
         "run_on_card",
         "run_on_twin",
-        "run_session",
+    ),
+    "session": ("run_session",),
+    "tuning": ("TuningResult", "tune"),
+    "stability": (
+        "ModelStability",
+        "RigMargin",
+        "Stability",
+        "rig_margin",
+        "stability",
     ),
     "studies": (
         "HybridTest",
         "Identifiability",
-        "ModelStability",
-        "RigMargin",
         "Reproduction",
-        "Stability",
         "TunedCompensator",
-        "TuningResult",
         "blindcheck",
         "blindcheck_machines",
         "identifiability",
         "reproduce",
         "rths",
-        "rig_margin",
-        "stability",
-        "tune",
         "tune_compensator",
     ),
     "watching": ("Alarm", "Suspect", "Watch", "watch"),

@@ -14,7 +14,7 @@ import pytest
 import rigtwin
 from rigtwin.api.arguments import check_arguments, describe, fits
 from rigtwin.errors import RigtwinError
-from rigtwin.hardware.daq.table import find_table
+from rigtwin.hardware.daq.table_file import find_table
 
 FUNCTIONS = {
     name: value

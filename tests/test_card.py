@@ -20,17 +20,12 @@ from rigtwin.description.configuration import Configuration
 from rigtwin.description.settings import Safety
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq import CARD
-from rigtwin.hardware.daq.card import Card, CardFault, connect
+from rigtwin.hardware.daq.card import Card
 from rigtwin.hardware.daq.conversion import CODES, conversion, to_bits, to_values, to_volts
+from rigtwin.hardware.daq.driver import CardFault, connect
 from rigtwin.hardware.daq.failsafe import release
-from rigtwin.hardware.daq.table import (
-    ChannelTable,
-    load_table,
-    parse_table,
-    require_ranges,
-    require_trust,
-    to_toml,
-)
+from rigtwin.hardware.daq.table import ChannelTable, require_ranges, require_trust
+from rigtwin.hardware.daq.table_file import load_table, parse_table, to_toml
 from rigtwin.hardware.daq.terminals import Terminals
 from rigtwin.hardware.daq.transport import LOCAL, InProcess, serve
 from rigtwin.hardware.daq.virtual import BAD_VALUE, DriverError, OnDemand, RealTime, VirtualCard

@@ -13,11 +13,11 @@ import pytest
 
 import machines
 import rigtwin
-from rigtwin.api.session import plan_test
+from rigtwin.api.planning import plan_test
 from rigtwin.cli import main
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq.signals import signals_of
-from rigtwin.hardware.daq.table import load_table, to_toml
+from rigtwin.hardware.daq.table_file import load_table, to_toml
 from rigtwin.hardware.daq.wired import WiredTwin
 from rigtwin.hardware.session.record import open_virtual_card, record_unpaced
 from rigtwin.hardware.session.test import MachineTest

@@ -31,7 +31,7 @@ from rigtwin.hardware.daq.calibration import (
     set_spans,
     set_zeros,
 )
-from rigtwin.hardware.daq.table import load_table, to_toml
+from rigtwin.hardware.daq.table_file import load_table, to_toml
 from rigtwin.hardware.daq.terminals import Terminals
 from rigtwin.hardware.daq.wired import InRealTime, WiredTwin
 from rigtwin.hardware.realtime import Pacer, in_real_time, list_shortcomings, sleep_until
@@ -206,7 +206,7 @@ def test_mistakes_are_said_before_anything_moves(
 
 @pytest.mark.slow
 def test_the_rig_is_armed_only_after_a_dry_run_of_just_that(card, capsys, tmp_path, monkeypatch):
-    monkeypatch.setattr(permission, "open_card", lambda _: None)
+    monkeypatch.setattr(permission, "open_card", lambda *_: None)
     monkeypatch.chdir(tmp_path)
     run = ["run", "imposed", "--target", "daq", "--card", str(card), *SHORT]
     assert main(run) == 1

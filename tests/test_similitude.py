@@ -10,7 +10,9 @@ import pytest
 
 from controllers import Settings
 from controllers.quantity import Quantity, fields
+from experiments.thesis import scaled_landing
 from experiments.thesis import similitude as study
+from experiments.thesis.landing import touch_down
 from rigtwin.errors import RigtwinError
 from rigtwin.studies.similitude import (
     Dimension,
@@ -230,18 +232,25 @@ def test_time_is_stretched_until_the_velocity_fits():
 
 def test_the_landing_is_the_same_at_any_size_and_pace():
     instants = np.linspace(0.0, 1.5, 301)
-    full = study.touch_down(study.BOEING, instants)
-    real = study.similar(500.0, 0.559)
-    for scale in (real, slow_down(real, 3.0, 0.3), study.similar(1e6, 0.05, 0.2)):
-        rig = study.at_scale(study.BOEING, scale)
-        assert study.difference(full, study.mapped_back(rig, scale, instants)) < 1e-6
+    full = touch_down(scaled_landing.BOEING, instants)
+    real = scaled_landing.similar(500.0, 0.559)
+    for scale in (real, slow_down(real, 3.0, 0.3), scaled_landing.similar(1e6, 0.05, 0.2)):
+        rig = scaled_landing.at_scale(scaled_landing.BOEING, scale)
+        assert (
+            scaled_landing.difference(full, scaled_landing.mapped_back(rig, scale, instants)) < 1e-6
+        )
         one_off = rig._replace(damping=1.02 * rig.damping)
-        assert study.difference(full, study.mapped_back(one_off, scale, instants)) > 1e-3
+        assert (
+            scaled_landing.difference(full, scaled_landing.mapped_back(one_off, scale, instants))
+            > 1e-3
+        )
 
 
 def test_the_landing_comes_to_rest_under_its_weight():
-    damped = study.BOEING._replace(damping=20 * study.BOEING.damping, lift=0.0, velocity=0.5)
-    travel, velocity, force = study.touch_down(damped, np.linspace(0.0, 12.0, 13))[:, -1]
+    damped = scaled_landing.BOEING._replace(
+        damping=20 * scaled_landing.BOEING.damping, lift=0.0, velocity=0.5
+    )
+    travel, velocity, force = touch_down(damped, np.linspace(0.0, 12.0, 13))[:, -1]
     assert force == pytest.approx(damped.sprung_mass * damped.gravity, rel=1e-4)
     assert travel == pytest.approx(
         0.673 * (1.0 - (damped.gas_force / force) ** (1.0 / 1.4)), rel=1e-4

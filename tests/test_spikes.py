@@ -15,7 +15,9 @@ from rigtwin.cli import main
 from rigtwin.errors import RigtwinError
 from rigtwin.recording import load
 from rigtwin.simulation.runner import record
-from rigtwin.studies.friction_spikes import BOUNDS, filter_lag, find_compensator, reversals
+from rigtwin.studies.friction_loop import filter_lag
+from rigtwin.studies.friction_spikes import BOUNDS, find_compensator
+from rigtwin.studies.reversals import reversals
 
 
 @pytest.fixture(scope="module")

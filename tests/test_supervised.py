@@ -19,10 +19,11 @@ from rigtwin.cli import main
 from rigtwin.description.changes import from_assignments
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq import CARD
-from rigtwin.hardware.daq.table import load_table
+from rigtwin.hardware.daq.table_file import load_table
 from rigtwin.hardware.daq.wired import WiredTwin
-from rigtwin.hardware.faults.campaign import draw_faults, read_final_cause, try_fault
+from rigtwin.hardware.faults.campaign import draw_faults, try_fault
 from rigtwin.hardware.faults.kinds import KINDS
+from rigtwin.hardware.faults.outcome import read_final_cause
 from rigtwin.hardware.faults.processes import FaultNotReached, try_process_fault
 from rigtwin.hardware.session.record import open_virtual_card, record_unpaced
 from rigtwin.hardware.session.stops import stop_requests

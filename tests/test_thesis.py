@@ -9,6 +9,13 @@ import pytest
 from matplotlib.image import imread
 
 from experiments.thesis import quarter_car_tests, validation
+from experiments.thesis.actuator_tests import (
+    ELECTRIC,
+    FITTED,
+    fit_transfer_function,
+    thesis_cylinder,
+    thesis_force_loop,
+)
 from experiments.thesis.catalogue import (
     NOTHING_TO_COMPUTE,
     STUDIES,
@@ -24,13 +31,6 @@ from experiments.thesis.entry import (
     last_digit,
     number,
     statement,
-)
-from experiments.thesis.identification import (
-    ELECTRIC,
-    FITTED,
-    fit_transfer_function,
-    thesis_cylinder,
-    thesis_force_loop,
 )
 from experiments.thesis.reproduction import Chapter, agreement_by_table, document, page, text
 from experiments.thesis.study import Conclusion, Drawing, ThesisStudy, sheet

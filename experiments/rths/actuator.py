@@ -54,6 +54,7 @@ def draw_plants(count: int, seed: int = 1) -> list[ActuatorPlant]:
 
     The same seed gives the same plants, whatever the count.
     """
+    # One row of normal numbers a plant: a larger count extends the series and changes no plant.
     random = np.random.default_rng([seed, 7])
     drawn = [ActuatorPlant()]
     for deviation in random.standard_normal((count - 1, 4)) * np.array(SPREAD):
@@ -103,9 +104,11 @@ def sampled(plant: ActuatorPlant) -> tuple[Array, Array]:
 def transfer(plant: ActuatorPlant) -> tuple[Sequence[float], Sequence[float]]:
     """Return numerator and denominator of command → position, highest power of s first."""
     specimen = plant.specimen
+    # G_0 before its feedback: (s + a_3)(m_e s² + c_e s + k_e).
     specimen_denominator = np.polymul(
         [1.0, plant.a3], [specimen.mass, specimen.damping, specimen.stiffness]
     )
+    # The velocity feedback adds 4.2297e6 s to the denominator.
     feedback_denominator = np.polyadd(specimen_denominator, [VELOCITY, 0.0])
     denominator = np.polyadd(
         np.polymul([1.0, plant.beta1, plant.beta2], feedback_denominator), [VALVE]

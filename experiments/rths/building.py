@@ -105,12 +105,15 @@ def find_case(number: int) -> BuildingCase:
 
 def frequencies(case: BuildingCase) -> Array:
     """Return the natural frequencies of the whole building, Hz, ascending, shape (3,)."""
+    # Generalised eigenvalues K φ = ω² M φ.
+    # The generalised eigenproblem K φ = ω² M φ; eigh returns ω² in ascending order.
     squares, _ = eigh(STIFFNESS, case.mass * np.eye(FLOORS))
     return np.sqrt(squares) / (2.0 * math.pi)
 
 
 def whole_building(case: BuildingCase) -> Sampled:
     """Return the reference: the whole building, simulated."""
+    # Nothing is removed, so the force input is never used.
     return _sampled(case, Specimen(0.0, 0.0, 0.0))
 
 

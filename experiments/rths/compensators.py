@@ -45,6 +45,8 @@ def sample_controller() -> LinearLaw:
 
 def _nominal_delay() -> float:
     """Return the delay of the nominal plant at low frequency, s: the slope of its phase."""
+    # A polynomial 1 + τ s + … inverts the plant at low frequency: its second coefficient is the
+    # delay.
     below, above = transfer(ActuatorPlant())
     return inverse_coefficients(below, above, 0.0, 1)[1]
 

@@ -78,6 +78,7 @@ def delay(commanded: Array, measured: Array) -> float:
 
 def _rms(error: Array, signal: Array) -> float:
     """Return the rms of an error relative to the rms of a signal, %."""
+    # The standard deviation is the rms about the mean, so an offset of a signal does not count.
     return 100.0 * float(np.std(error) / np.std(signal))
 
 

@@ -27,6 +27,8 @@ def ground_motion(quake: str) -> Array:
     if quake not in QUAKES:
         raise RigtwinError(f"quake {quake}: expected {', '.join(QUAKES)}")
     name = QUAKES[quake]
+    # The package may be installed as an archive, from which the file is unpacked for as long as
+    # needed.
     with as_file(files("experiments.rths") / "earthquakes" / f"{name}NoScaling.mat") as path:
         time, acceleration = loadmat(path)[name]
     # The records have 50 to 200 samples a second, the benchmark 4096.

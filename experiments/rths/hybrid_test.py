@@ -146,6 +146,8 @@ def run_test(
     stable = last == len(ground)
     return HybridTest(
         judge(desired, measured, reference) if stable else Criteria(*[np.inf] * 9),
+        # Force and motion of the whole record, zeros behind a divergence included; the speed
+        # needs the part that was simulated.
         float(np.max(np.abs(signals[5]))),
         float(np.max(np.abs(signals[4]))),
         float(np.max(np.abs(np.diff(signals[4][:last])))) / PERIOD,
@@ -171,6 +173,7 @@ def _simulate(
         building.force,
         a,
         b,
+        # The actuator's states are scaled; position and force are scaled back by these.
         1.0 / UNITS,
         ground,
         _draw(noise, len(ground), seed),
@@ -228,6 +231,7 @@ def _split_law(law: Law) -> tuple[LinearLaw, AdaptiveLaw]:
 
 def _draw(noise: Noise, ticks: int, seed: int) -> Array:
     """Return the noise of position and force, V, shape (2, ticks), each value held for `HELD`."""
+    # A stream apart from that of the plants, so that noise and plants are independent.
     random = np.random.default_rng([seed, 3])
     # The noise of the real converters is band-limited: one value holds for `HELD`.
     index = (np.arange(ticks) * PERIOD / HELD).astype(int)
@@ -264,11 +268,13 @@ def _loop(  # type: ignore[no-untyped-def]
     """
     state, force = np.zeros(6), 0.0
     actuator, next_actuator = np.zeros(5), np.zeros(5)
+    # Two states each: the new one must not overwrite what the remaining rows still read.
     next_state = np.zeros(6)
     memory, adaptive_state = np.zeros(len(linear.a)), start.copy()
     for tick in range(len(ground)):
         position = actuator[0] * units[0]
         true_force = actuator[2] * units[2]
+        # Noise enters before the converter rounds, as it does on the real hardware.
         measured = _rounded(position / METRES + noise[0, tick]) * METRES
         measured_force = _rounded(true_force / NEWTONS + noise[1, tick]) * NEWTONS
         if is_linear:

@@ -82,6 +82,8 @@ def _jobs(seeds: int) -> Mapping[str, Job]:
         # A compensator that fails in El Centro is not run with the other earthquakes.
         for quake in QUAKES if name in ("sample", BEST, *ADAPTIVE) else ("elcentro",):
             for case in CASES:
+                # One job for each combination, so that cores share the work and finished jobs are
+                # kept.
                 jobs[f"{name}/{quake}/{case}"] = partial(_robustness, case, quake, name)
     return jobs
 
@@ -176,10 +178,5 @@ def _summarise(result: Result) -> str:
 
 
 STUDY = ThesisStudy(
-    "rths",
-    "The benchmark of real-time hybrid simulation",
-    "RTHS",
-    (),
-    _conclude,
-    _jobs,
+    "rths", "The benchmark of real-time hybrid simulation", "RTHS", (), _conclude, _jobs
 )

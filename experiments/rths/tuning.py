@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from operator import itemgetter
 
 import numpy as np
 from scipy.optimize import minimize
@@ -171,6 +172,10 @@ class _TestSeries:
             worst = max(worst, test.criteria.j2 if test.stable else WORST)
         return worst
 
+    def criterion(self, law: Law) -> float:
+        """Return what the search minimises, %."""
+        return self.worst_tracking(law) + self.noise_response(law)
+
     def noise_response(self, law: Law) -> float:
         """Return J2 with noise on the nominal plant, above that of the noise alone, %."""
         test = run_test(self._case, self._ground, law, noise=BENCHMARK)
@@ -210,6 +215,16 @@ def _descend(
     return optimum.x, float(optimum.fun)
 
 
+def _improve(
+    objective: Callable[[np.ndarray], float], start: np.ndarray, evaluations: int
+) -> tuple[tuple[np.ndarray, float], tuple[np.ndarray, float]]:
+    """Return the start and the best point, each with its value."""
+    # Gains and weights act by their order of magnitude: the search runs over logarithms.
+    first = start, objective(start)
+    # In this order: a simplex that found nothing better must not change the compensator.
+    return first, min(first, _descend(objective, start, evaluations), key=itemgetter(1))
+
+
 def tune_compensator(
     name: str,
     case: int = 4,
@@ -227,20 +242,15 @@ def tune_compensator(
     ----------
     name : str
         Compensator, one of `TUNABLE`.
-    case : int
-        Case of the building, 1 to 4. Defaults to 4.
-    quake : str
-        Earthquake: elcentro, kobe or morgan. Defaults to elcentro.
-    plants : int
-        Number of plants in the criterion, the nominal one included, 1 to 1000. Defaults to 8.
-    held_out_plants : int
-        Number of plants for the validation, 1 to 1000. Defaults to 12.
+    case, quake : int, str
+        Case of the building, 1 to 4, and earthquake: elcentro, kobe or morgan.
+    plants, held_out_plants : int
+        Numbers of plants in the criterion, the nominal one included, and in the validation, 1 to
+        1000.
     evaluations : int
         Largest number of evaluations of the criterion, 3 to 1000. Defaults to 60.
-    seed : int
-        Seed of the random plants. Defaults to 1.
-    progress : callable
-        Function called with 1 after every evaluation.
+    seed, progress : int, callable
+        Seed of the random plants, and function called with 1 after every evaluation.
 
     Returns
     -------
@@ -260,23 +270,17 @@ def tune_compensator(
     validation = _TestSeries(building, ground, drawn[plants:])
 
     def objective(point: np.ndarray) -> float:
-        law = tunable.make(**tunable.values(point))
         progress(1)
-        return tuning.worst_tracking(law) + tuning.noise_response(law)
+        return tuning.criterion(tunable.make(**tunable.values(point)))
 
-    # Gains and weights act by their order of magnitude: the search runs over logarithms.
-    start = tunable.start()
-    first_criterion = objective(start)
-    best, best_criterion = _descend(objective, start, evaluations)
-    if best_criterion >= first_criterion:
-        best, best_criterion = start, first_criterion
+    (start, first), (best, last) = _improve(objective, tunable.start(), evaluations)
     initial, tuned = tunable.values(start), tunable.values(best)
     before, after = tunable.make(**initial), tunable.make(**tuned)
     return TunedCompensator(
         name=name,
         before=initial,
         after=tuned,
-        criterion=(first_criterion, best_criterion),
+        criterion=(first, last),
         judged=(validation.worst_tracking(before), validation.worst_tracking(after)),
         noisy=(validation.noise_response(before), validation.noise_response(after)),
         tests=tuning.tests + validation.tests,

@@ -26,9 +26,8 @@ from experiments.thesis.loci import Claim, LocusCase, locus
 from rigtwin.studies.stability.locus import BODY, WHEEL
 
 A2_9 = (
-    "at low ratios every pole is near its ideal one, as the thesis goes "
-    "on to say of the wheel hop; the body hop's damping has "
-    "the wrong sign all the same"
+    "at low ratios every pole is near its ideal one, as the thesis goes on to say of the wheel "
+    "hop; the body hop's damping has the wrong sign all the same"
 )
 
 
@@ -78,8 +77,10 @@ def _a2_1() -> tuple[LocusCase, ...]:
 def _a2_2() -> tuple[LocusCase, ...]:
     """Return the cases of Table A2.2: the sprung natural frequency is swept."""
     cases = []
+    # In structure MIL only the body moves with a lag, so the wheel hop follows its ideal longer.
     for number, ratio, lag, figure in OF_STIFFNESS:
         name, variations = f"A2.{figure}", SLOW if lag == 0.2 else QUICK
+        # The thesis compares structure MIL with suspension MIL over the same sweep.
         beside = locus("suspension", variations[ratio])
         note = (
             "the caption of Figure A2.8 says ζ = 1.5, Table A2.2 0.5: the table is right"
@@ -164,10 +165,7 @@ def _a2_3_quick() -> LocusCase:
         ),
         claim("A2.12", "high ratios", "no asymptote of the wheel hop", shapes.pairs_at_start(1, 1)),
         claim(
-            "A2.12",
-            "low ratios",
-            "wheel hop matches the ideal",
-            resemblance.wheel_resembles("end"),
+            "A2.12", "low ratios", "wheel hop matches the ideal", resemblance.wheel_resembles("end")
         ),
     )
 

@@ -4,22 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import partial
 
 import numpy as np
 from scipy.linalg import eigh
-from scipy.signal import welch
 
 from controllers import Settings
 from controllers.beam import ARMS, BEAMS, FREEDOMS, HEAVE, NODES, all_modes, assembled, modes
 from experiments import find
 from experiments.thesis import ride
+from experiments.thesis.beam_drawings import modes_drawing, spectrum, wing_drawing
 from experiments.thesis.entry import Entry, band, digits, statement
 from experiments.thesis.ride import MEASURED, SHOWN_SEED
-from experiments.thesis.study import Conclusion, Drawing, Job, Result, ThesisStudy, sheet, span
+from experiments.thesis.study import Conclusion, Job, Result, ThesisStudy, span
 from experiments.thesis.trial import over_seeds, seeded, trial
 from rigtwin.description.configuration import Configuration
-from rigtwin.render.plot import SENSED
-from rigtwin.render.style import COLOURS
 from rigtwin.simulation.ideal import simulate_ideal
 from rigtwin.simulation.runner import simulate
 from rigtwin.simulation.safety import Trip
@@ -31,10 +30,9 @@ TABLE_7_5 = {"bent passive": "0.679", "semi-active": "0.256", "active": "0.227"}
 The passive test with straight beams diverges on the twin, see `RUNS_AWAY`.
 """
 RUNS_AWAY = (
-    "with beams that start straight, as in Fig. 7.15, the centre's first "
-    "swing asks 0.72 m/s of a cylinder that gives 0.3, and "
-    "the passive twin runs away; these are of beams that start "
-    "bent by the preload, whose drop is smaller"
+    "with beams that start straight, as in Fig. 7.15, the centre's first swing asks 0.72 m/s of a "
+    "cylinder that gives 0.3, and the passive twin runs away; these are of beams that start bent "
+    "by the preload, whose drop is smaller"
 )
 ON_A_SPRING = 1000.0
 """Stiffness of the spring under the centre, N/m, that shifts the modes in Figure 7.16."""
@@ -67,18 +65,13 @@ def _run(name: str, seed: int) -> Result:
 
 def jobs(seeds: int) -> Mapping[str, Job]:
     """Return the jobs of the study."""
-    return seeded(
-        {
-            name: lambda seed, name=name: _run(name, seed)
-            for name in (*TABLE_7_5, "straight passive")
-        },
-        seeds,
-    )
+    return seeded({name: partial(_run, name) for name in (*TABLE_7_5, "straight passive")}, seeds)
 
 
 def _on_spring(settings: Settings) -> np.ndarray:
     """Return the frequencies of the modes that move the centre on a spring, Hz."""
     mass, stiffness = assembled(settings)
+    # The spring acts on the heave of the centre node alone.
     stiffness[HEAVE, HEAVE] += ON_A_SPRING
     squares, shapes = eigh(stiffness, mass)
     return np.sqrt(np.abs(squares[np.abs(shapes[HEAVE]) > 1e-3])) / (2 * math.pi)
@@ -107,6 +100,7 @@ def _structure(settings: Settings) -> list[Entry]:
     mass, _ = assembled(settings)
     # A unit heave of all nodes: uᵀ M u is the mass that a rigid motion feels.
     upward = np.zeros(FREEDOMS)
+    # Every node has six degrees of freedom, of which one is heave.
     upward[HEAVE::6] = 1.0
     weight = float(upward @ mass @ upward)
     sprung, worst = _on_spring(settings), _reduction_error(settings)
@@ -141,7 +135,7 @@ def _structure(settings: Settings) -> list[Entry]:
     ]
 
 
-def _entries(results: dict[str, Result]) -> list[Entry]:
+def _entries(results: Mapping[str, Result]) -> list[Entry]:
     """Return all entries of §7.2 and of appendices B3 to B5."""
     entries = _structure(find("beam-passive").configuration.controller)
     for name, text in TABLE_7_5.items():
@@ -197,7 +191,7 @@ def _entries(results: dict[str, Result]) -> list[Entry]:
     return entries + _statements(results)
 
 
-def _statements(results: dict[str, Result]) -> list[Entry]:
+def _statements(results: Mapping[str, Result]) -> list[Entry]:
     """Return the entries of what §7.2 says about its figures."""
     entries = []
     result = results[f"semi-active/{SHOWN_SEED}"]
@@ -206,6 +200,7 @@ def _statements(results: dict[str, Result]) -> list[Entry]:
     swings = np.ptp(heights[: round(2.0 / 0.02)], axis=0)
     text = " < ".join(f"{swing:.0f} mm" for swing in swings[1:])
     # Points of one mode move in phase: every pair correlates.
+    # From 0.2 to 2 s: the swing after the drop, not the settled sag.
     correlation = np.corrcoef(heights[10:100, 1:].T).min()
     entries += [
         statement(
@@ -227,6 +222,8 @@ def _statements(results: dict[str, Result]) -> list[Entry]:
         over_seeds(results, name, "travel rms")
         for name in ("bent passive", "semi-active", "active")
     ]
+    # Ratios of the same road, seed by seed, before the median: roads differ more than
+    # suspensions.
     difference = np.median(np.abs(travels[1] / travels[2] - 1))
     entries.append(
         statement(
@@ -255,136 +252,27 @@ def _statements(results: dict[str, Result]) -> list[Entry]:
     return entries
 
 
-def _modes_drawing(settings: Settings) -> Drawing:
-    """Draw the lowest mode shapes, and the compliance with all and with few modes."""
-    figure, axes = sheet(1, 2, height=3.0)
-    model = modes(settings, 1e-3)
-    distance = settings.beam_length * np.arange(BEAMS + 1)
-    for number in range(4):
-        shape = model.wing[number] / np.abs(model.wing[number]).max()
-        label = f"{model.frequencies[number]:.2f} Hz"
-        both_arms = np.concatenate([shape[::-1], shape[1:]])
-        axes[0][0].plot(
-            np.concatenate([-distance[::-1], distance[1:]]), both_arms, marker=".", label=label
-        )
-    axes[0][0].set(
-        xlabel="m from the centre",
-        ylabel="shape",
-        title="the modes that the centre feels, of two arms",
-    )
-    axes[0][0].legend(fontsize=8)
-    frequencies = np.geomspace(0.2, 20.0, 500)
-    s = 2j * math.pi * frequencies
-    for label, count, colour in (
-        ("78 degrees of freedom", None, COLOURS["other"]),
-        ("six modes", 6, SENSED),
-        ("two modes", 2, "#2f9e44"),
-    ):
-        if count is None:
-            angular, shapes = all_modes(settings)
-            centre = shapes[HEAVE]
-        else:
-            angular, centre = 2 * math.pi * model.frequencies[:count], model.centre[:count]
-        parts = centre[:, None] ** 2 / (
-            s**2 + settings.beam_damping * angular[:, None] ** 2 * s + angular[:, None] ** 2
-        )
-        axes[0][1].loglog(
-            frequencies,
-            np.abs(np.sum(parts, axis=0)),
-            color=colour,
-            label=label,
-            linestyle="--" if count == 6 else "-",
-        )
-    axes[0][1].set(xlabel="Hz", ylabel="m/N", title="compliance at the centre")
-    axes[0][1].legend(fontsize=8)
-    return Drawing(
-        "figure-7.10", "Figure 7.10 and 7.11", "Four arms of three beams, modal reduction.", figure
-    )
-
-
-def _wing_drawing(results: dict[str, Result]) -> Drawing:
-    """Draw the heights of the points along an arm."""
-    figure, axes = sheet(3, 1, height=2.3)
-    for row, (name, label) in zip(
-        axes,
-        (
-            ("bent passive", "passive, bent start"),
-            ("semi-active", "semi-active"),
-            ("active", "active"),
-        ),
-        strict=True,
-    ):
-        result = results[f"{name}/{SHOWN_SEED}"]
-        for point in range(1, BEAMS + 1):
-            row[0].plot(
-                result["time"],
-                np.asarray(result["wing"])[:, point],
-                linewidth=0.9,
-                label=f"{2 * point} m from the centre",
-            )
-        row[0].plot(
-            result["time"],
-            np.asarray(result["ideal wing"])[:, BEAMS],
-            color="black",
-            linewidth=0.5,
-            label="tip, ideal",
-        )
-        row[0].set(ylabel=f"{label}, mm", xlim=(0, 12))
-    axes[0][0].legend(fontsize=8, ncols=4)
-    axes[2][0].set(xlabel="time, s")
-    caption = (
-        "Height of points along an arm above the centre; they settle at the sag under the weight."
-    )
-    return Drawing("figure-7.15", "Figure 7.15, 7.20, 7.24, B3.7, B4.7 and B5.7", caption, figure)
-
-
-def _spectrum(results: dict[str, Result]) -> Drawing:
-    """Draw the spectrum of the sprung mass with its second resonance (Fig. 7.16)."""
-    figure, axes = sheet(1, 1, width=7.5, height=3.2)
-    axis = axes[0][0]
-    for name, colour in (("semi-active", SENSED), ("bent passive", COLOURS["other"])):
-        result = results[f"{name}/{SHOWN_SEED}"]
-        step = float(np.asarray(result["time"])[1])
-        for kind, style in (("plate", "-"), ("ideal plate", ":")):
-            frequencies, power = welch(
-                np.asarray(result[kind]), fs=1 / step, nperseg=512, detrend="linear"
-            )
-            inside = (frequencies > 0) & (frequencies < 6)
-            label = f"{name}, {'twin' if kind == 'plate' else 'ideal'}"
-            axis.semilogy(
-                frequencies[inside], np.sqrt(power[inside]), style, color=colour, label=label
-            )
-    axis.set(xlabel="Hz", ylabel="mm/√Hz", title="sprung mass: a second resonance at 3 Hz")
-    axis.legend(fontsize=8)
-    return Drawing(
-        "figure-7.16",
-        "Figure 7.16",
-        "The beams add a resonance that a point mass does not have.",
-        figure,
-    )
-
-
 def conclude(results: Mapping[str, Result]) -> Conclusion:
     """Return the entries, drawings and remarks of §7.2."""
-    by_key = dict(results)
+
     shown = {
-        "passive, bent start" if name == "bent passive" else name: by_key[f"{name}/{SHOWN_SEED}"]
+        "passive, bent start" if name == "bent passive" else name: results[f"{name}/{SHOWN_SEED}"]
         for name in TABLE_7_5
     }
     covers = "Figure 7.12 to 7.14, 7.17 to 7.19, 7.21 to 7.23, 7.25 to 7.27, B3.1 to B5.6"
     drawings = [
-        _modes_drawing(find("beam-passive").configuration.controller),
+        modes_drawing(find("beam-passive").configuration.controller),
         ride.histories(
             "figure-7.25",
             covers,
             "The beams under passive, semi-active and active suspension.",
             shown,
         ),
-        _wing_drawing(by_key),
-        _spectrum(by_key),
+        wing_drawing(results),
+        spectrum(results),
     ]
-    remarks = [ride.remark(by_key, name) for name in TABLE_7_5]
-    return Conclusion(_entries(by_key), drawings, remarks)
+    remarks = [ride.remark(results, name) for name in TABLE_7_5]
+    return Conclusion(_entries(results), drawings, remarks)
 
 
 STUDY = ThesisStudy(

@@ -91,6 +91,7 @@ def select_studies(name: str | None) -> ThesisSelection:
     chapter = tuple(study for study in STUDIES.values() if plain in study.chapter.lower().split())
     if chapter:
         return ThesisSelection(chapter, None)
+    # table-5.1, `Table 5.1` and `table 5.1` name the same.
     wanted = " ".join(name.replace("-", " ").split()).lower()
     for study in STUDIES.values():
         for covered in study.covers:

@@ -128,6 +128,7 @@ def band(
     The rule says whether the printed value lies inside that band.
     """
     entry = factor(where, quantity, printed, ours, unit, within, note)
+    # The printed value is one test on one road, so it may lie anywhere in the band of the seeds.
     low, high = np.percentile(ours, [5.0, 95.0])
     value, slack = number(printed), SLACK * last_digit(printed)
     inside = "in" if low - slack <= value <= high + slack else "outside"

@@ -7,12 +7,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
 from controllers import Compensator
 from experiments.thesis.entry import Entry, digits, factor, statement
-from experiments.thesis.friction_drawings import IN_TIME, LATE, drawings, errors_of, two_step
+from experiments.thesis.friction_drawings import IN_TIME, LATE, ROWS, drawings, errors_of, two_step
 from experiments.thesis.friction_tests import (
     LOOPS,
     calibrate,
@@ -22,6 +23,7 @@ from experiments.thesis.friction_tests import (
     run_timed_steps,
     variant_errors,
 )
+from experiments.thesis.ride import interval
 from experiments.thesis.study import Conclusion, Job, Result, ThesisStudy, span
 from rigtwin.numerics.arrays import Array
 
@@ -57,9 +59,8 @@ TABLE_4_2 = {
 }
 """Thesis Table 4.2, N rms. The table calls the tracking error e1 and the numerical one e2."""
 NOISE = (
-    "the thesis' spikes rise in 20 ms and its filtered noise is 1 N; the "
-    "nominal rig's friction turns within a tick and its "
-    "hum is 3.1 N after the filter, as high as these thresholds"
+    "the thesis' spikes rise in 20 ms and its filtered noise is 1 N; the nominal rig's friction "
+    "turns within a tick and its hum is 3.1 N after the filter, as high as these thresholds"
 )
 SINES = {"1 Hz": (1.0, 0.02), "5 Hz": (5.0, 0.001)}
 """Frequency, Hz, and amplitude of the plate, m, of Figures 4.8 and 4.9."""
@@ -98,6 +99,7 @@ def _section(settings: Mapping[str, object]) -> Result:
         test = run_compensated(
             0, **LOOPS["nominal"], **settings, compensator=Compensator.parse(name)
         )
+        # Four seconds of the test from 10 s on, in ticks of 1 ms.
         shown = slice(10_000, 14_000)
         signals |= {
             "time": test.time[shown],
@@ -126,6 +128,7 @@ def _calibrated(loop: str, count: int) -> Result:
 
 def jobs(seeds: int) -> Mapping[str, Job]:
     """Return the jobs of the study; at most `MOST_SEEDS` seeds are used."""
+    # Each seed stands for a test of every variant, so few seeds have to do.
     count = min(seeds, MOST_SEEDS)
     work: dict[str, Job] = {
         f"calibrated-{loop}": (lambda loop=loop: _calibrated(loop, count)) for loop in LOOPS
@@ -147,6 +150,7 @@ def _reduction(
     results: Mapping[str, Result], loop: str, row: str, error: str, base: str = "none"
 ) -> Array:
     """Return the reduction of an error against a base row, %, shape (seeds,)."""
+    # Seed by seed: both rows drove over the same road, so its scatter cancels.
     return 100 * (1 - errors_of(results, loop, row)[error] / errors_of(results, loop, base)[error])
 
 
@@ -159,13 +163,14 @@ def _tables(results: Mapping[str, Result]) -> list[Entry]:
         for error, text in zip(ERRORS, printed, strict=True):
             note = "printed `A1.184`; its row sums to 5.404" if text == "5.404" else ""
             entry = factor("Table 4.1", f"{row}: {error}", text, errors[error], "N", WITHIN, note)
-            entries.append(entry if entry.agrees or note else _noted(entry, NOISE))
+            # A note is a reason for a difference; an entry that agrees needs none.
+            entries.append(entry if entry.agrees or note else replace(entry, note=NOISE))
     for name, printed in TABLE_4_2.items():
         row = name if name == "none" else f"{name} 4"
         errors = errors_of(results, "fitted", row)
         for error, text in zip(ERRORS, printed, strict=True):
             entry = factor("Table 4.2", f"{name}: {error}", text, errors[error], "N", WITHIN)
-            entries.append(entry if entry.agrees else _noted(entry, NOISE))
+            entries.append(entry if entry.agrees else replace(entry, note=NOISE))
     entries.append(
         digits(
             "Table 4.2",
@@ -178,17 +183,6 @@ def _tables(results: Mapping[str, Result]) -> list[Entry]:
     return entries
 
 
-def _noted(entry: Entry, note: str) -> Entry:
-    """Return an entry with a note."""
-    return Entry(**{**vars(entry), "note": note})
-
-
-def _interval(values: Array, unit: str = " %") -> str:
-    """Format the median and the 5 to 95 % interval of some values."""
-    low, middle, high = np.percentile(values, [5, 50, 95])
-    return f"{middle:.3g}{unit} ({low:.3g} to {high:.3g})"
-
-
 def _goals(results: Mapping[str, Result]) -> list[Entry]:
     """Return entries for the reductions that the thesis reports, and for the observer."""
     entries = [
@@ -198,7 +192,7 @@ def _goals(results: Mapping[str, Result]) -> list[Entry]:
     ]
     spike = _reduction(results, "nominal", "calibrated two-step", "spike")
     before = errors_of(results, "nominal", "none")["spike"]
-    text = f"{_interval(spike)} less, from {np.median(before):.0f} N"
+    text = f"{interval(spike, ' %')} less, from {np.median(before):.0f} N"
     holds = bool(np.median(spike) >= 50)
     entries.append(
         statement(
@@ -223,7 +217,7 @@ def _total_reduction(results: Mapping[str, Result], loop: str, row: str) -> Entr
         f"{row}, {loop} force loop",
         "37 % less e1 + e2",
         holds,
-        f"{_interval(reduction)} less",
+        f"{interval(reduction, ' %')} less",
         "" if holds else note,
     )
 
@@ -242,7 +236,7 @@ def _observer_entry(results: Mapping[str, Result]) -> Entry:
     )
     text = (
         f"{np.median(observer):.2f} N against {np.median(best):.2f} N, "
-        f"{_interval(100 * (1 - observer / best))} less, in every seed"
+        f"{interval(100 * (1 - observer / best), ' %')} less, in every seed"
     )
     return statement(
         "beyond",
@@ -322,31 +316,19 @@ def conclude(results: Mapping[str, Result]) -> Conclusion:
     for loop in ("nominal", "fitted"):
         calibrated = results[f"calibrated-{loop}"]
         remarks.append(
-            f"calibrated with the {loop} loop (K_p {LOOPS[loop]['kp']:g}, "
-            f"K_i {LOOPS[loop]['ki']:g} 1/s): "
-            f"F_c {calibrated['friction']:.1f} N, "
-            f"threshold {calibrated['setting spike_threshold']:.1f} N, "
-            f"gradient {1e-3 * float(calibrated['setting spike_gradient']):.2f} N a tick "
-            f"over {calibrated['setting spike_samples']:.0f} samples, "
-            f"window {1e3 * float(calibrated['setting crossing_time']):.0f} ms; "
-            f"{calibrated['detected']:.0f} of {calibrated['reversals']:.0f} "
-            f"reversals detected, {calibrated['false']:.0f} false, "
-            f"{1e3 * float(calibrated['delay']):.0f} ms late"
+            f"calibrated with the {loop} loop (K_p {LOOPS[loop]['kp']:g}, K_i "
+            f"{LOOPS[loop]['ki']:g} 1/s): F_c {calibrated['friction']:.1f} N, threshold "
+            f"{calibrated['setting spike_threshold']:.1f} N, gradient "
+            f"{1e-3 * float(calibrated['setting spike_gradient']):.2f} N a tick over "
+            f"{calibrated['setting spike_samples']:.0f} samples, window "
+            f"{1e3 * float(calibrated['setting crossing_time']):.0f} ms; "
+            f"{calibrated['detected']:.0f} of {calibrated['reversals']:.0f} reversals detected, "
+            f"{calibrated['false']:.0f} false, {1e3 * float(calibrated['delay']):.0f} ms late"
         )
-        for row in (
-            "one-step 4",
-            "two-step 4",
-            "calibrated one-step",
-            "calibrated two-step",
-            "observer",
-        ):
-            text = (
-                f"{loop} loop, {row}: e1 + e2 "
-                f"{np.median(errors_of(results, loop, row)['total']):.2f} N, "
-            )
-            remarks.append(
-                text + f"{_interval(_reduction(results, loop, row, 'total'))} less than without"
-            )
+        for row in ROWS[1:]:
+            total = np.median(errors_of(results, loop, row)["total"])
+            less = interval(_reduction(results, loop, row, "total"), " %")
+            remarks.append(f"{loop} loop, {row}: e1 + e2 {total:.2f} N, {less} less than without")
     return Conclusion(entries, drawings(results), remarks)
 
 

@@ -7,13 +7,18 @@ from collections.abc import Mapping
 import numpy as np
 
 from controllers.friction import MOTOR_LAG
-from experiments.thesis.study import Drawing, Result, sheet
+from experiments.thesis.study import Drawing, Result, sheet, trace
 from rigtwin.numerics.arrays import Array
 from rigtwin.render.plot import ASKED, SENSED
 from rigtwin.render.style import COLOURS
 
 IN_TIME, LATE = 0.9e-3, 15e-3
 """Time from the first step to the second, s: when the error has vanished, and well after it."""
+ROWS = (
+    *("none", "one-step 4", "two-step 4"),
+    *("calibrated one-step", "calibrated two-step", "observer"),
+)
+"""Compensators that are compared; `4` is the thesis' threshold in N."""
 
 
 def errors_of(results: Mapping[str, Result], loop: str, row: str) -> dict[str, Array]:
@@ -28,6 +33,7 @@ def errors_of(results: Mapping[str, Result], loop: str, row: str) -> dict[str, A
             for key in ("tracking", "numerical", "spike")
         }
     else:
+        # Sorted as numbers: as text, seed 10 would come before seed 2.
         seeds = sorted(
             (key for key in results if key.startswith(f"{loop}/")),
             key=lambda key: int(key.partition("/")[2]),
@@ -55,18 +61,11 @@ def _timing_drawing(results: Mapping[str, Result]) -> Drawing:
     figure, axes = sheet(1, 3, height=3.0)
     none = results["timing/None"]
     for axis, offsets in zip(axes[0], ((0.0, 0.005), (-0.015, -0.005), (0.015,)), strict=True):
-        axis.plot(
-            none["time"], none["error"], color=COLOURS["other"], linewidth=0.8, label="no step"
-        )
+        trace(axis, none, "error", color=COLOURS["other"], linewidth=0.8, label="no step")
         for offset, colour in zip(offsets, (SENSED, ASKED), strict=False):
+            label = f"step {1e3 * offset:+.0f} ms from reversal"
             timed = results[f"timing/{offset}"]
-            axis.plot(
-                timed["time"],
-                timed["error"],
-                color=colour,
-                linewidth=0.8,
-                label=f"step {1e3 * offset:+.0f} ms from reversal",
-            )
+            trace(axis, timed, "error", color=colour, linewidth=0.8, label=label)
         axis.set(xlim=(2.0, 3.2), xlabel="time, s", ylabel="force error, N")
         axis.legend(fontsize=7)
     return Drawing(
@@ -116,8 +115,8 @@ def _section_drawing(results: Mapping[str, Result]) -> Drawing:
     figure, axes = sheet(3, 1, height=2.3)
     section = results["calibrated-nominal"]
     time = np.asarray(section["time"])
-    axes[0][0].plot(time, section["none force"], color=SENSED, linewidth=0.8, label="felt")
-    axes[0][0].plot(time, section["none asked"], color=ASKED, linewidth=0.9, label="demanded")
+    trace(axes[0][0], section, "none force", color=SENSED, linewidth=0.8, label="felt")
+    trace(axes[0][0], section, "none asked", color=ASKED, linewidth=0.9, label="demanded")
     axes[0][0].set(ylabel="force, N", title="no compensation")
     pairs = (
         (("none", COLOURS["other"]), ("one-step", SENSED), ("two-step", ASKED)),
@@ -145,9 +144,12 @@ def two_step(first: float, wait: float | None) -> tuple[Array, Array, Array]:
     """
     period, gain, jump = 1e-4, 40.0, 28.0
     motor, integral = 0.0, 0.0
+    # 0.1 ms apart, from 5 ms before the reversal to 85 ms after it.
     time = (np.arange(900) - 50) * period
     error, force = np.empty(900), np.empty(900)
     for tick, now in enumerate(time):
+        # Coulomb friction jumps from one sign to the other; only the change by `jump` matters
+        # here.
         force_at_mass = motor - (jump if now >= 0 else 0.0)
         error[tick], force[tick] = -force_at_mass, motor
         step = 0.0 if now < 0.004 else jump * (first if wait is None or now < 0.004 + wait else 1.0)
@@ -170,6 +172,8 @@ def _two_step_drawing() -> Drawing:
         axes[0][0].plot(1e3 * time, error, color=colour, label=label)
         axes[0][1].plot(1e3 * time, force, color=colour)
     for first, colour in ((1.0, COLOURS["other"]), (2.0, SENSED), (3.0, ASKED)):
+        # A first step of n times the jump removes the error in 1/(n − 1) of the time that twice
+        # the jump takes.
         time, error, _ = two_step(first, IN_TIME / (first - 1.0) if first > 1 else None)
         axes[0][2].plot(1e3 * time, error, color=colour, label=f"{first:g} times the jump at first")
     axes[0][0].set(xlabel="ms", ylabel="force error, N")
@@ -187,16 +191,8 @@ def _two_step_drawing() -> Drawing:
 def _bars(results: Mapping[str, Result]) -> Drawing:
     """Draw the errors of the compensators as bars, for both force loops."""
     figure, axes = sheet(1, 2, height=3.4)
-    names = (
-        "none",
-        "one-step 4",
-        "two-step 4",
-        "calibrated one-step",
-        "calibrated two-step",
-        "observer",
-    )
     for axis, loop in zip(axes[0], ("nominal", "fitted"), strict=True):
-        for number, name in enumerate(names):
+        for number, name in enumerate(ROWS):
             errors = errors_of(results, loop, name)
             tracking, numerical = (
                 float(np.median(errors[key])) for key in ("tracking", "numerical")
@@ -212,8 +208,8 @@ def _bars(results: Mapping[str, Result]) -> Drawing:
         axis.set(
             title=f"{loop} force loop",
             xlabel="rms error, N",
-            yticks=range(len(names)),
-            yticklabels=names,
+            yticks=range(len(ROWS)),
+            yticklabels=ROWS,
         )
         axis.invert_yaxis()
         axis.legend(fontsize=8)

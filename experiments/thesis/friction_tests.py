@@ -23,7 +23,7 @@ from controllers import (
 from controllers.force import MOTOR_CONSTANT
 from experiments import find
 from experiments.experiment import time_of
-from experiments.thesis.identification import thesis_cylinder
+from experiments.thesis.actuator_tests import thesis_cylinder
 from experiments.thesis.study import Result
 from experiments.thesis.trial import ThesisTrial, trial
 from rigtwin.description.configuration import Configuration
@@ -34,13 +34,8 @@ from rigtwin.signals.excitation import fade_in
 from rigtwin.signals.noise import rms
 from rigtwin.simulation.runner import record, simulate
 from rigtwin.simulation.twin import Twin
-from rigtwin.studies.friction_spikes import (
-    BOUNDS,
-    Calibration,
-    detections,
-    filter_lag,
-    find_compensator,
-)
+from rigtwin.studies.friction_loop import detections, filter_lag
+from rigtwin.studies.friction_spikes import BOUNDS, Calibration, find_compensator
 
 LOOPS: dict[str, dict[str, float]] = {
     "fitted": {"kp": 1.0, "ki": 190.0},
@@ -90,6 +85,7 @@ def spikes(test: ThesisTrial) -> Array:
     velocity = np.gradient(gaussian_filter1d(test.travel, 2), period)
     reversals = np.flatnonzero(np.diff(np.sign(velocity)) != 0)
     window = round(AFTER / period)
+    # Padding at both ends by a window lets the first and last reversal count as isolated.
     reversals = reversals[
         (np.diff(reversals, prepend=-window) > window)
         & (np.diff(reversals, append=len(velocity) + window) > window)
@@ -100,6 +96,7 @@ def spikes(test: ThesisTrial) -> Array:
     error = test.simulation.commands[:, 2] - filtered
     # Three ticks later the sign is safe: at the reversal itself the velocity is zero.
     directions = np.sign(velocity[reversals + 3])
+    # The three ticks before the reversal are left out, as its tick is uncertain by some ticks.
     before = np.array([np.mean(error[reversal - 15 : reversal - 3]) for reversal in reversals])
     peaks = np.array(
         [
@@ -178,6 +175,7 @@ def sine_test(frequency: float, amplitude: float, seconds: float) -> tuple[Confi
 
     frequency: Hz; amplitude: of the plate itself, m; seconds: length of the test.
     """
+    # Imposed motion: no vehicle model closes a loop, so the reversals come when they are due.
     settings = Settings(
         mode=Mode.IMPOSED, filter_force=0.004, filter_velocity=0.0064, filter_position=0.004
     )._replace(**LOOPS["fitted"])
@@ -204,12 +202,14 @@ def detect_reversals(
     ran = simulate(configuration, demands, seed)
     period = configuration.timing.period
     # The detector runs over the recorded signals, so its steps do not change the motion.
+    # One step suffices to detect: the second step of two follows by itself.
     tuned = configuration.controller._replace(compensator=Compensator.ONE_STEP, **settings)
     steps = detections(
         tuned, ran.measurements[:, 2], ran.commands[:, 2], ran.measurements[:, 3], period
     )
     velocity = np.gradient(gaussian_filter1d(ran.truth[:, 2], 2), period)
     reversals = np.flatnonzero(np.diff(np.sign(velocity)) != 0)
+    # The motion fades in at first, and its small reversals prove nothing.
     reversals = reversals[reversals > 1000]
     directions = np.sign(velocity[reversals + 3])
     detection_ticks = np.flatnonzero(steps)
@@ -218,6 +218,8 @@ def detect_reversals(
         for turn, direction in zip(reversals, directions, strict=True)
     ]
     delays = [
+        # Windows begin two ticks early, as the reversal's own tick is uncertain; −2 restores its
+        # origin.
         np.flatnonzero(steps[turn - 2 : turn + 40] == direction)[0] - 2
         for turn, direction, s in zip(reversals, directions, seen, strict=True)
         if s
@@ -251,6 +253,7 @@ def run_timed_steps(offset: float | None, seed: int = 0) -> Result:
     levels = np.sign(velocity)
     if offset is not None:
         shift = round(offset / period)
+        # A shift in time, with the first or last direction held at the end that becomes empty.
         levels = (
             np.concatenate([np.full(shift, levels[0]), levels[:-shift]])
             if shift > 0

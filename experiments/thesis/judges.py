@@ -27,6 +27,7 @@ def all_hold(*judges: Judge) -> Judge:
     """Return a judge that holds if all judges hold."""
 
     def judge(locus: Locus) -> tuple[bool, str]:
+        # Every judge is called, also after one has failed, so that the finding is complete.
         findings = [each(locus) for each in judges]
         return all(holds for holds, _ in findings), "; ".join(
             dict.fromkeys(words for _, words in findings)
@@ -47,6 +48,8 @@ def becomes_unstable(*modes: str) -> Judge:
     def judge(locus: Locus) -> tuple[bool, str]:
         start, end = unstable_at_ends(locus)
         crossed = {crossing.mode for crossing in locus.crossings}
+        # All three: a mode that was unstable at the start has not become so, and one that is
+        # stable again at the end is not unstable.
         return bool(not start and end and crossed == set(modes)), describe_crossings(locus)
 
     return judge
@@ -68,9 +71,8 @@ def not_unstable_at(value: float) -> Judge:
     def judge(locus: Locus) -> tuple[bool, str]:
         # On the boundary the real part is zero up to rounding.
         rightmost = locus.poles_at(value).real.max()
-        return bool(
-            rightmost <= TOGETHER
-        ), f"real part {rightmost:.2g} 1/s at {value:g}; {describe_crossings(locus)}"
+        words = f"real part {rightmost:.2g} 1/s at {value:g}; {describe_crossings(locus)}"
+        return bool(rightmost <= TOGETHER), words
 
     return judge
 
@@ -80,9 +82,8 @@ def unstable_before_start(*modes: str) -> Judge:
 
     def judge(locus: Locus) -> tuple[bool, str]:
         unstable = locus.unstable_modes(float(locus.values[0]) / BEYOND)
-        return set(modes) <= set(
-            unstable
-        ), f"{' and '.join(unstable) or 'nothing'} unstable {BEYOND:g} times before the start"
+        words = f"{' and '.join(unstable) or 'nothing'} unstable {BEYOND:g} times before the start"
+        return set(modes) <= set(unstable), words
 
     return judge
 

@@ -75,6 +75,7 @@ def touch_down(landing: Landing, instants: Array) -> Array:
     def derivative(time: float, state: Array) -> list[float]:
         # Heights above the ground at touch-down, m; both masses start with the sinking speed.
         body, wheel, body_velocity, wheel_velocity = state.tolist()
+        # The stop acts only where the strut would extend beyond its length.
         strut = strut_force(
             wheel - body, wheel_velocity - body_velocity
         ) + landing.stop_stiffness * min(wheel - body, 0.0)
@@ -92,6 +93,7 @@ def touch_down(landing: Landing, instants: Array) -> Array:
     hanging = (landing.gas_force + landing.unsprung_mass * landing.gravity) / (
         landing.stop_stiffness + stiffness(spring, 0.0)
     )
+    # The wheel touches the ground at t = 0.
     start = [hanging, 0.0, -landing.velocity, -landing.velocity]
     span = (float(instants[0]), float(instants[-1]))
     # The stop and the tyre make the forces non-smooth; the step limit keeps them from being missed.

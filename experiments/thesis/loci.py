@@ -195,6 +195,7 @@ def locus(model: str, variation: LocusVariation) -> Locus:
 
     Loci are cached, because several judges compare a locus with others.
     """
+    # Equal ratios, since a sweep spans up to seven decades.
     values = np.logspace(math.log10(variation.start), math.log10(variation.end), POINTS)
     return Locus(model, values, variation.at)
 
@@ -202,6 +203,7 @@ def locus(model: str, variation: LocusVariation) -> Locus:
 def drawing(name: str, covers: str, caption: str, cases: Sequence[LocusCase]) -> Drawing:
     """Return a drawing with all panels of some cases."""
     panels = [(case, panel) for case in cases for panel in case.panels]
+    # Two or four panels fill a sheet of two columns; otherwise three leave least space empty.
     columns = 2 if len(panels) in (2, 4) else 3
     figure, axes = sheet(math.ceil(len(panels) / columns), columns, width=4.0 * columns, height=3.6)
     flat = [axis for row in axes for axis in row]

@@ -111,6 +111,7 @@ COLUMNS_5_13 = tuple(
 def _real_part(model: str, car: QuarterCar, lag: float, mode_name: str) -> float:
     """Return the largest real part of the oscillating poles of a mode, 1/s."""
     car_poles = poles(MODELS[model](car, lag)).tolist()
+    # Of each pair the pole above the real axis; the filters' real poles have no mode.
     return max(pole.real for pole in car_poles if pole.imag > 0.0 and mode(car, pole) == mode_name)
 
 
@@ -185,10 +186,8 @@ def _table_5_13() -> list[Entry]:
 
 def _ends(model: str, column: int) -> list[tuple[Locus, float]]:
     """Return the sweeps that a column of Table 5.13 summarises, with the value at its end."""
-    frequency, ratio = (
-        of_natural_frequency(1.0, SUSPENSION_LAG, 1e5),
-        of_damping_ratio(SUSPENSION_LAG),
-    )
+    frequency = of_natural_frequency(1.0, SUSPENSION_LAG, 1e5)
+    ratio = of_damping_ratio(SUSPENSION_LAG)
     tyre, wheel = of_tyre_stiffness(SMALL_LAG), of_wheel_mass(SMALL_LAG)
     # True selects the end of a sweep. The damping ratio falls as its swept value rises, and so does
     # the unsprung frequency with the mass of the wheel.

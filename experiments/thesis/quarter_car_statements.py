@@ -30,6 +30,7 @@ AROUND = np.array(ARBITRARY._replace(tyre_damping=10.0))
 
 def statements() -> list[Entry]:
     """Return the entries of the statements of §5.3 to §5.6."""
+    # A fixed seed, as the statement is about these vehicles and must not change from run to run.
     random = np.random.default_rng(0)
     # Log-normal factors with σ = 1: most parameters stay within a factor of 7 of the median.
     cars = [
@@ -38,6 +39,7 @@ def statements() -> list[Entry]:
     ]
     # Eq. 5.57, τ_c = b/k, is derived without tyre damping.
     undamped = [car._replace(tyre_damping=0.0) for car in cars]
+    # Largest |τ_c k/b − 1|, which vanishes if the equation holds.
     deviation = max(
         abs(
             _time(critical_lag(LOOPS["suspension"](car)))
@@ -49,11 +51,9 @@ def statements() -> list[Entry]:
     )
     damped = _time(critical_lag(LOOPS["suspension"](ARBITRARY._replace(tyre_damping=10.0))))
     sample = f"of {RANDOM_CARS} vehicles drawn at random"
-    where, quantity, claim = (
-        "Equation 5.57",
-        "critical lag of suspension MIL",
-        "b/k whatever the tyre",
-    )
+    where = "Equation 5.57"
+    quantity = "critical lag of suspension MIL"
+    claim = "b/k whatever the tyre"
     note = "as Table 5.6, case 4: it holds without tyre damping alone"
     words = f"{damped:.4f} s, b/k = {SUSPENSION_LAG:g} s"
     entries = [
@@ -102,10 +102,8 @@ def _only_body(name: str, drawn: Sequence[QuarterCar]) -> Entry:
             f"; median unsprung over sprung natural frequency {with_it:.2f} "
             f"in those, {without:.2f} in the others"
         )
-    says, note = (
-        "only the body hop can become unstable",
-        "false for slow wheels, heavy or on soft tyres" if any(unstable) else "",
-    )
+    says = "only the body hop can become unstable"
+    note = "false for slow wheels, heavy or on soft tyres" if any(unstable) else ""
     return statement("§5.3.6", f"structure MIL, {name}", says, not any(unstable), words, note)
 
 
@@ -203,6 +201,8 @@ def _first_mode(model: str, car: QuarterCar) -> str | None:
 def _wheel_too(car: QuarterCar) -> bool:
     """Return whether a lag of the structure can make the wheel hop unstable, alone or not."""
     critical = _time(critical_lag(LOOPS["structure"](car)))
+    # Behind the critical lag one mode is unstable already; the question is whether the wheel hop
+    # follows.
     sweep = Locus("structure", critical * BEYOND, lambda lag: Setting(car, lag))
     return any(WHEEL in sweep.unstable_modes(float(lag)) for lag in sweep.values)
 

@@ -2,26 +2,28 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from functools import partial
 
 import numpy as np
-from scipy.integrate import solve_ivp
 from scipy.signal import butter, sosfiltfilt, welch
 
 from experiments import find
 from experiments.quarter_car import ROAD_CHAPTER_7
 from experiments.thesis.entry import Entry, factor, statement
-from experiments.thesis.study import Conclusion, Drawing, Job, Result, ThesisStudy, sheet, span
+from experiments.thesis.quarter_car_drawings import (
+    body_frequency,
+    histories,
+    lag_drawing,
+    lagged_drops,
+    spectrum_drawing,
+)
+from experiments.thesis.study import Conclusion, Job, Result, ThesisStudy, span
 from experiments.thesis.trial import ThesisTrial, curves, errors, over_seeds, seeded, trial, vehicle
 from rigtwin.description.configuration import Configuration
 from rigtwin.numerics.arrays import Array
-from rigtwin.render.plot import ASKED, SENSED
-from rigtwin.render.style import COLOURS
 from rigtwin.simulation.ideal import simulate_ideal
 
-IDEAL = COLOURS["other"]
 WITHIN = 1.5  # factor within which a computed error agrees with a printed one
 MOST_SEEDS = 8
 SHOWN_SEED = 0
@@ -59,6 +61,7 @@ def _run(
 def _observations(test: ThesisTrial) -> dict[str, float]:
     """Return what the thesis reads off its plots: overshoot, force at rest, motion of the wheel."""
     period = test.configuration.timing.period
+    # The drop takes place within 3 s; from 12 s on the rig stands.
     early, late = slice(0, round(3 / period)), slice(round(12 / period), None)
     while_hopping = slice(round(1.5 / period), round(4.0 / period))
     # Slower than 0.1 mm/s counts as standing still: friction holds the wheel.
@@ -74,8 +77,8 @@ def _observations(test: ThesisTrial) -> dict[str, float]:
         "ideal hop": float(np.std(hop(test.ideal.wheel, period)[while_hopping])),
         "moving": moving[0],
         "ideal moving": moving[1],
-        "body frequency": _body_frequency(test.simulation.commands[:, 1], period),
-        "ideal body frequency": _body_frequency(test.ideal.structure, period),
+        "body frequency": body_frequency(test.simulation.commands[:, 1], period),
+        "ideal body frequency": body_frequency(test.ideal.structure, period),
         "rest position": float(np.mean(test.plate[late])),
         "ideal rest position": float(np.mean(test.ideal.structure[late])),
     }
@@ -84,18 +87,6 @@ def _observations(test: ThesisTrial) -> dict[str, float]:
 def hop(signal: Array, period: float) -> Array:
     """Return the wheel hop in a motion: its part above `HOP` Hz, without phase lag."""
     return sosfiltfilt(butter(2, HOP, "highpass", fs=1 / period, output="sos"), signal)
-
-
-def _body_frequency(position: Array, period: float) -> float:
-    """Return the frequency of the body after the drop, Hz, from crossings of its rest position.
-
-    NaN stands for fewer than three crossings in the first 4 s.
-    """
-    early = position[: round(4 / period)]
-    crossings = np.flatnonzero(
-        np.diff(np.sign(early - np.mean(position[-round(2 / period) :]))) != 0
-    )
-    return float(1.0 / (period * (crossings[2] - crossings[0]))) if len(crossings) > 2 else math.nan
 
 
 def _spectra(test: ThesisTrial) -> dict[str, Array]:
@@ -115,15 +106,12 @@ def _spectra(test: ThesisTrial) -> dict[str, Array]:
     return {**spectra, "frequencies": welch(test.plate[5000:], **options)[0][1:82]}
 
 
-def _chapter_7_band(configuration: Configuration) -> Configuration:
-    """Return a configuration with the road of chapter 7."""
-    return configuration._replace(road=ROAD_CHAPTER_7)
-
-
 def jobs(seeds: int) -> Mapping[str, Job]:
     """Return the jobs of the study; at most `MOST_SEEDS` seeds are used."""
     work: dict[str, Callable[[int], Result]] = {name: partial(_run, name) for name in TESTS}
-    work["road0.2-1.6"] = partial(_run, "road1.6", change=_chapter_7_band)
+    work["road0.2-1.6"] = partial(
+        _run, "road1.6", change=lambda usual: usual._replace(road=ROAD_CHAPTER_7)
+    )
     return seeded(work, min(seeds, MOST_SEEDS))
 
 
@@ -235,6 +223,7 @@ def _lag_entries() -> list[Entry]:
 
 def _friction_entries(results: Mapping[str, Result]) -> list[Entry]:
     """Return the entries of limit cycle, wheel and drift: the traces of friction in §6.3."""
+    # Medians over the seeds, as single tests differ by their noise.
     swing, hop_rms, ideal_hop = (
         _median(results, "drop", key) for key in ("swing at rest", "hop", "ideal hop")
     )
@@ -285,52 +274,6 @@ def _friction_entries(results: Mapping[str, Result]) -> list[Entry]:
     ]
 
 
-def lagged_drops() -> dict[str, tuple[float, Array]]:
-    """Simulate the ideal drop with first-order lags (Fig. 6.26).
-
-    The lag is 20 ms on the force, 20 ms on the position, or 50 ms on the damping force alone.
-
-    Returns the body frequency, Hz, and the position of the sprung mass every millisecond, m, for
-    each place of the lag and for none.
-    """
-    # Quarter car of Table 6.2: spring, damper, sprung mass, tyre, unsprung mass.
-    k, b, m, kt, mu = 1000.0, 50.0, 25.0, 50_000.0, 34.0
-    time = np.arange(0.0, 5.0, 1e-3)
-
-    def derivative_with(lag: str) -> Callable[[float, Array], list[float]]:
-        def derivative(_: float, s: Array) -> list[float]:
-            # All filters run side by side; `lag` selects the one whose output is used.
-            body, rate, wheel, wheel_rate, force, damping, lagged_body, lagged_rate = s
-            seen, seen_rate = (
-                (lagged_body, lagged_rate) if lag == "lag on position" else (body, rate)
-            )
-            damper_force = b * (seen_rate - wheel_rate)
-            used_damping = damping if lag == "lag on damping" else damper_force
-            demanded = 200.0 - k * (seen - wheel) - used_damping
-            applied = force if lag == "lag on force" else demanded
-            return [
-                rate,
-                applied / m - 9.81,
-                wheel_rate,
-                (-kt * wheel - applied) / mu,
-                (demanded - force) / 0.02,
-                (damper_force - damping) / 0.05,
-                (body - lagged_body) / 0.02,
-                (rate - lagged_rate) / 0.02,
-            ]
-
-        return derivative
-
-    start = np.array([-0.004, 0.0, -0.004, 0.0, 200.0, 0.0, -0.004, 0.0])
-    drops = {}
-    for lag in ("none", "lag on force", "lag on position", "lag on damping"):
-        solution = solve_ivp(
-            derivative_with(lag), (0.0, 5.0), start, t_eval=time, rtol=1e-8, atol=1e-10
-        )
-        drops[lag] = (_body_frequency(solution.y[0], 1e-3), solution.y[0])
-    return drops
-
-
 def _damped_wheel() -> tuple[bool, str]:
     """Judge the remaining wheel hop with a tyre damping of 1000 Ns/m, against none (Fig. 6.33)."""
     configuration = find("drop").configuration
@@ -339,101 +282,22 @@ def _damped_wheel() -> tuple[bool, str]:
         plant = configuration.plant._replace(
             tyre=configuration.plant.tyre._replace(damping=damping)
         )
+        # 4000 ticks of 1 ms; the hop is judged from 0.6 to 1.6 s, after its first swing.
         wheel = simulate_ideal(configuration._replace(plant=plant), np.zeros(4000)).wheel
         remaining.append(float(np.std(hop(wheel, 1e-3)[600:1600])))
-    return remaining[1] < 0.1 * remaining[
-        0
-    ], f"{1e6 * remaining[1]:.1f} um rms left after 0.6 s, without {1e6 * remaining[0]:.0f} um"
-
-
-def _histories(name: str, result: Result, covers: str, until: float) -> Drawing:
-    """Draw the time histories of a test until a time, s, and its error subspaces."""
-    figure, axes = sheet(2, 3, height=2.6)
-    time = np.asarray(result["time"])
-    shown = time <= until
-    panels = (
-        ("plate", "sprung mass, mm"),
-        ("travel", "suspension travel, mm"),
-        ("wheel", "wheel, mm"),
-        ("force", "suspension force, N"),
-    )
-    for axis, (kind, label) in zip([*axes[0], axes[1][0]], panels, strict=True):
-        axis.plot(
-            time[shown],
-            np.asarray(result[f"ideal {kind}"])[shown],
-            color=IDEAL,
-            linewidth=1.2,
-            label="ideal",
-        )
-        axis.plot(
-            time[shown], np.asarray(result[kind])[shown], color=SENSED, linewidth=0.8, label="twin"
-        )
-        axis.set(xlabel="time, s", ylabel=label)
-    axes[0][0].legend(fontsize=8)
-    # Twin over ideal: delay opens a loop about the diagonal, friction makes steps across it.
-    for axis, kind, unit in ((axes[1][1], "force", "N"), (axes[1][2], "plate", "mm")):
-        should = np.asarray(result[f"ideal {kind}"])
-        axis.plot(should, np.asarray(result[kind]), color="#2f9e44", linewidth=0.5)
-        axis.plot(should, should, color=SENSED, linewidth=1.0)
-        axis.set(xlabel=f"ideal {kind}, {unit}", ylabel=f"twin {kind}, {unit}")
-    return Drawing(
-        f"test-{name}", covers, f"Test {name}: twin beside the ideal; error subspaces.", figure
-    )
-
-
-def _lag_drawing() -> Drawing:
-    """Draw the ideal drop with a lag in different places (Fig. 6.26)."""
-    figure, axes = sheet(1, 1, width=7.5, height=3.2)
-    axis = axes[0][0]
-    for (name, (frequency, position)), colour in zip(
-        lagged_drops().items(), (IDEAL, SENSED, "#2f9e44", ASKED), strict=True
-    ):
-        axis.plot(
-            np.arange(len(position)) * 1e-3,
-            1e3 * position,
-            color=colour,
-            label=f"{name}, {frequency:.3f} Hz",
-            linewidth=1.0,
-        )
-    axis.set(xlabel="time, s", ylabel="sprung mass, mm")
-    axis.legend(fontsize=8)
-    caption = (
-        "A lag on the damping alone puts it out of phase with the spring: the body swings faster."
-    )
-    return Drawing("figure-6.26", "Figure 6.26", caption, figure)
-
-
-def _spectrum_drawing(result: Result) -> Drawing:
-    """Draw the amplitude spectra on the 10 Hz road (Fig. 6.48, 6.49)."""
-    figure, axes = sheet(1, 2)
-    for axis, kind in zip(axes[0], ("plate", "travel"), strict=True):
-        for name, colour, label in (
-            (f"spectrum ideal {kind}", IDEAL, "ideal"),
-            (f"spectrum {kind}", SENSED, "twin"),
-        ):
-            axis.loglog(result["frequencies"], result[name], color=colour, label=label)
-        axis.set(
-            xlabel="Hz",
-            ylabel="mm/√Hz",
-            title={"plate": "sprung mass", "travel": "suspension travel"}[kind],
-        )
-    axes[0][0].legend(fontsize=8)
-    return Drawing(
-        "figure-6.48",
-        "Figure 6.48 and 6.49",
-        "10 Hz road: the wheel hop of the ideal is missing on the rig.",
-        figure,
-    )
+    without, damped = remaining
+    words = f"{1e6 * damped:.1f} um rms left after 0.6 s, without {1e6 * without:.0f} um"
+    return damped < 0.1 * without, words
 
 
 def conclude(results: Mapping[str, Result]) -> Conclusion:
     """Return the entries and drawings of §6.3."""
     drawings = [
-        _histories("drop", results[f"drop/{SHOWN_SEED}"], "Figure 6.24 to 6.35", 8.0),
-        _lag_drawing(),
-        _histories("road1.6", results[f"road1.6/{SHOWN_SEED}"], "Figure 6.36 to 6.43", 30.0),
-        _histories("road10", results[f"road10/{SHOWN_SEED}"], "Figure 6.44 to 6.51", 20.0),
-        _spectrum_drawing(results[f"road10/{SHOWN_SEED}"]),
+        histories("drop", results[f"drop/{SHOWN_SEED}"], "Figure 6.24 to 6.35", 8.0),
+        lag_drawing(),
+        histories("road1.6", results[f"road1.6/{SHOWN_SEED}"], "Figure 6.36 to 6.43", 30.0),
+        histories("road10", results[f"road10/{SHOWN_SEED}"], "Figure 6.44 to 6.51", 20.0),
+        spectrum_drawing(results[f"road10/{SHOWN_SEED}"]),
     ]
     return Conclusion(_entries(results), drawings)
 

@@ -75,6 +75,7 @@ def agreement_by_table(entries: Sequence[Entry], every: bool) -> list[TableAgree
     for name in TABLES:
         entries_of_table = [entry for entry in entries if entry.where == name]
         if entries_of_table:
+            # A dictionary keeps equal reasons once, in the order of the table.
             reasons = dict.fromkeys(
                 entry.note or entry.what for entry in entries_of_table if not entry.agrees
             )

@@ -19,9 +19,8 @@ def closest_at(end: str) -> Judge:
     def judge(locus: Locus) -> tuple[bool, str]:
         start, last = (_relative_distances(locus, float(value)) for value in locus.values[[0, -1]])
         first, second = max(start.values()), max(last.values())
-        return bool(
-            (first < second) == (end == "start")
-        ), f"{format_percent(first)} off at the start, {format_percent(second)} at the end"
+        words = f"{format_percent(first)} off at the start, {format_percent(second)} at the end"
+        return bool((first < second) == (end == "start")), words
 
     return judge
 
@@ -143,11 +142,14 @@ def body_unstable_at_end(locus: Locus) -> tuple[bool, str]:
 
 def undamped_at_boundary(locus: Locus) -> tuple[bool, str]:
     """Judge whether the modes cross at the frequencies of the undamped vehicle."""
+    # Both crossings belong to the same vehicle, unless the sweep changes it; then the first
+    # counts.
     car = locus.at(locus.crossings[0].value).car._replace(suspension_damping=0.0, tyre_damping=0.0)
     undamped = (
         ideal_single_mass(car.sprung) if locus.model == "single-mass" else ideal_quarter_car(car)
     )
     expected = sorted(pole.imag for pole in poles(undamped) if pole.imag > 0.0)
+    # Sorted on both sides, because the order of crossings along the sweep says nothing here.
     crossed = sorted(crossing.frequency for crossing in locus.crossings)
     # At the boundary the lag cancels the damping, so the vehicle swings as if undamped.
     holds = len(crossed) == len(expected) and bool(np.allclose(crossed, expected, rtol=1e-6))
@@ -173,12 +175,14 @@ def undamped_at_end(mode: str) -> Judge:
 def _relative_distances(locus: Locus, value: float) -> dict[str, float]:
     """Return for each mode the largest relative distance of an ideal pole from its counterpart."""
     ideal, poles, car = locus.ideal_at(value), locus.poles_at(value), locus.at(value).car
+    # Relative to the ideal pole's magnitude, so that slow and fast modes count alike.
     distances = np.abs(ideal[:, None] - poles[None, :]) / np.abs(ideal)[:, None]
     # The lagged model has more poles than the ideal one; the assignment of the smallest total
     # distance picks each ideal pole's counterpart.
     rows, columns = linear_sum_assignment(distances)
     largest: dict[str, float] = {}
     for row, column in zip(rows, columns, strict=True):
+        # The ideal pole decides on the mode, as the counterpart's shape may have changed.
         mode = locus.mode(car, complex(ideal[row]))
         largest[mode] = max(largest.get(mode, 0.0), float(distances[row, column]))
     return largest

@@ -5,6 +5,8 @@ The studies of both structures, point mass and beams, share this module.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from controllers import Skyhook
@@ -89,6 +91,8 @@ def ride_measures(test: ThesisTrial) -> dict[str, Array | float]:
     if test.configuration.controller.skyhook == Skyhook.SEMI_ACTIVE:
         coefficient = damping(test)
         # A switch is a change between the lowest coefficient and a higher one.
+        # Equality within rounding is safe here, because the damper is clipped to its minimum
+        # exactly.
         at_least = coefficient <= test.configuration.controller.damping_min
         result["switches"] = float(np.sum(np.diff(at_least.astype(int)) != 0) / test.time[-1])
         result["damping"] = coefficient[::SHOWN]
@@ -98,12 +102,14 @@ def ride_measures(test: ThesisTrial) -> dict[str, Array | float]:
 def job_result(test: ThesisTrial, seed: int) -> Result:
     """Return the stored result of a test, with its curves for the drawn seed."""
     result = ride_measures(test)
+    # Curves are large, and drawn for one seed alone.
     if seed == SHOWN_SEED:
         result |= curves(test)
         result["asked damper"] = _damper(test)[::SHOWN]
         if test.ideal.wing is not None:
+            settings, period = test.configuration.controller, test.configuration.timing.period
             result |= {
-                "wing": 1e3 * _wing(test)[::SHOWN],
+                "wing": 1e3 * wing(settings, period, states_of(test))[::SHOWN],
                 "ideal wing": 1e3 * (test.ideal.wing - test.ideal.wing[:, :1])[::SHOWN],
             }
     # The history of the damper is drawn for one seed only; the others need not store it.
@@ -112,14 +118,10 @@ def job_result(test: ThesisTrial, seed: int) -> Result:
     return result
 
 
-def _wing(test: ThesisTrial) -> Array:
-    """Return the height of the beams' points above the centre, m, shape (ticks, points)."""
-    return wing(test.configuration.controller, test.configuration.timing.period, states_of(test))
-
-
 def _damper(test: ThesisTrial) -> Array:
     """Return the demanded force without preload and spring, N, shape (ticks,)."""
     settings, packed = test.configuration.controller, states_of(test)
+    # Demand = preload − k · travel + damper force, solved for the damper.
     return (
         test.simulation.commands[:, 2]
         - settings.preload
@@ -128,7 +130,7 @@ def _damper(test: ThesisTrial) -> Array:
 
 
 def reduction(
-    results: dict[str, Result], better: str, base: str, value: str = "acceleration"
+    results: Mapping[str, Result], better: str, base: str, value: str = "acceleration"
 ) -> Array:
     """Return the reduction of a value against a base test, %, shape (seeds,)."""
     return 100 * (1 - over_seeds(results, better, value) / over_seeds(results, base, value))
@@ -140,21 +142,20 @@ def interval(values: Array, unit: str) -> str:
     return f"{middle:.3g}{unit} ({low:.3g} to {high:.3g})"
 
 
-def remark(results: dict[str, Result], name: str) -> str:
+def remark(results: Mapping[str, Result], name: str) -> str:
     """Return a remark on the acceleration of the body, by both measures, and of the ideal."""
     body, unfiltered, ideal = (
         over_seeds(results, name, key) for key in ("acceleration", "everything", "ideal everything")
     )
     return (
-        f"{name}: body acceleration {interval(body, ' m/s²')}, with "
-        f"everything in it {interval(unfiltered, '')}; "
-        f"ideal {interval(ideal, '')}"
+        f"{name}: body acceleration {interval(body, ' m/s²')}, with everything in it "
+        f"{interval(unfiltered, '')}; ideal {interval(ideal, '')}"
     )
 
 
 def reduction_entry(
     where: str,
-    results: dict[str, Result],
+    results: Mapping[str, Result],
     better: str,
     base: str,
     printed: str,
@@ -175,16 +176,14 @@ def reduction_entry(
 
 def tracking_entries(
     table: str,
-    results: dict[str, Result],
+    results: Mapping[str, Result],
     name: str,
     printed: tuple[str, str, str, str],
     within: float,
 ) -> list[Entry]:
     """Return the entries of a table of appendix B: force error in N and %, position in m and %."""
-    force, position = (
-        over_seeds(results, name, "force_total"),
-        over_seeds(results, name, "position_total"),
-    )
+    force = over_seeds(results, name, "force_total")
+    position = over_seeds(results, name, "position_total")
     force_share = 100 * force / over_seeds(results, name, "ideal_force")
     position_share = 100 * position / over_seeds(results, name, "ideal_position")
     return [
@@ -196,7 +195,7 @@ def tracking_entries(
 
 
 def histories(
-    name: str, covers: str, caption: str, runs: dict[str, Result], until: float = 20.0
+    name: str, covers: str, caption: str, runs: Mapping[str, Result], until: float = 20.0
 ) -> Drawing:
     """Draw sprung mass, travel and tyre deflection of several tests; until: last time shown, s."""
     figure, axes = sheet(3, 1, height=2.2)

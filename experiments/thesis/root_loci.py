@@ -19,9 +19,8 @@ from rigtwin.studies.stability.critical import critical_lag
 from rigtwin.studies.stability.loop import LOOPS
 
 CAPTION = (
-    "Grey: the ideal quarter car. Coloured: with the lag, from dark "
-    "at the start of the sweep to light at its end. "
-    "Crosses: where poles cross the imaginary axis."
+    "Grey: the ideal quarter car. Coloured: with the lag, from dark at the start of the sweep to "
+    "light at its end. Crosses: where poles cross the imaginary axis."
 )
 VARIED = {
     "1": "the lag",
@@ -51,6 +50,7 @@ def _tables() -> list[Entry]:
                     "Ns/m",
                 )
             )
+        # ω = √(k/m) at the end of the sweep of k_s.
         end = math.sqrt(1e5 / ARBITRARY.sprung_mass)
         entries.append(
             digits(
@@ -64,6 +64,7 @@ def _tables() -> list[Entry]:
         entries.append(_ratio(f"Table {appendix}.3"))
         for table, variation in (("4", TYRES[PRINTED_LAG]), ("5", WHEELS[PRINTED_LAG])):
             # A lag above the critical one of every value contradicts the printed statements.
+            # A stable value of the sweep must have a critical lag above the printed one.
             largest = _largest_critical(model, variation)
             entries.append(
                 statement(
@@ -82,10 +83,8 @@ def _ratio(table: str) -> Entry:
     """Return the entry of the sweep of k_s = m_s: it must change the damping ratio alone."""
     variation = of_damping_ratio(FILTER_LAG)
     ends = [variation.at(value).car.sprung for value in (variation.start, variation.end)]
-    frequencies, ratios = (
-        [mass.natural_frequency for mass in ends],
-        [mass.damping_ratio for mass in ends],
-    )
+    frequencies = [mass.natural_frequency for mass in ends]
+    ratios = [mass.damping_ratio for mass in ends]
     words = f"{frequencies[0]:g} to {frequencies[1]:g} rad/s, ζ from {ratios[0]:g} to {ratios[1]:g}"
     varies = frequencies[0] == frequencies[1] and ratios[0] > ratios[1]
     return statement(
@@ -126,10 +125,9 @@ def conclude(results: Mapping[str, Result]) -> Conclusion:
 REMARKS = (
     "Body hop and wheel hop are told apart as in §5.3.1, by whether "
     "the masses move the same way or against each other.",
-    "Tables A1.4, A1.5, A2.4, A2.5, A3.4 and A3.5 print τ = 0.333 s for "
-    "case 1. The loop is then unstable for every value of "
-    "the sweep, and most of what the sections say is false; "
-    "with 0.0333 s it is true. Both are drawn.",
+    "Tables A1.4, A1.5, A2.4, A2.5, A3.4 and A3.5 print τ = 0.333 s for case 1. The loop is then "
+    "unstable for every value of the sweep, and most of what the sections say is false; with "
+    "0.0333 s it is true. Both are drawn.",
     "Table A1.3 prints b_u for b_t, Table A3.4 is captioned Table "
     "A1.3, and §A2.2 calls cases 4 to 6 cases 3 to 5.",
 )

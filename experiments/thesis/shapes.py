@@ -23,9 +23,8 @@ def asymptote(end: str) -> Judge:
             and abs(far.real - near.real) < 0.05 * abs(far.real)
             and far.real < 0.0
         )
-        return bool(
-            holds
-        ), f"real part → {far.real:.4g} 1/s, frequency {near.imag:.3g} → {far.imag:.3g} rad/s"
+        words = f"real part → {far.real:.4g} 1/s, frequency {near.imag:.3g} → {far.imag:.3g} rad/s"
+        return bool(holds), words
 
     return judge
 
@@ -121,9 +120,8 @@ def wheel_goes_left(locus: Locus) -> tuple[bool, str]:
     """Judge whether the real part of the fastest pair falls in the last third of the sweep."""
     third = locus.poles[2 * len(locus.poles) // 3 :]
     real = [max(row.tolist(), key=lambda pole: pole.imag).real for row in third]
-    return bool(
-        np.all(np.diff(real) < 0.0)
-    ), f"real part {real[0]:.3g} → {real[-1]:.3g} 1/s in the last third of the sweep"
+    words = f"real part {real[0]:.3g} → {real[-1]:.3g} 1/s in the last third of the sweep"
+    return bool(np.all(np.diff(real) < 0.0)), words
 
 
 def ends_left_of(reference: Locus, name: str) -> Judge:
@@ -150,6 +148,7 @@ def far_left(count: int) -> Judge:
     """Return a judge: `count` poles start far left, at ten times the largest ideal magnitude."""
 
     def judge(locus: Locus) -> tuple[bool, str]:
+        # Ten times the fastest ideal pole: the filter has decayed before the vehicle moves.
         limit = -10.0 * np.abs(locus.ideal[0]).max()
         far_poles = np.sort(locus.poles[0].real[locus.poles[0].real < limit])
         return len(far_poles) == count, f"{len(far_poles)}: {format_numbers(far_poles)} 1/s"
@@ -200,6 +199,7 @@ def _highest(locus: Locus, row: int) -> complex:
 def _beyond(locus: Locus, end: str) -> tuple[complex, complex]:
     """Return the pole of the highest frequency past an end of the sweep, 10³ and 10⁶ times."""
     value = float(locus.values[0] if end == "start" else locus.values[-1])
+    # Sweeps run over ratios, so both ends are extended by factors.
     factors = (1.0 / BEYOND, BEYOND**-2) if end == "start" else (BEYOND, BEYOND**2)
     near, far = (
         max(locus.poles_at(value * factor).tolist(), key=lambda pole: pole.imag)

@@ -91,6 +91,8 @@ def _equivalence() -> Entry:
     printed = spring / (MASS.mass * lag * s**3 + MASS.mass * s**2 + spring)
     force = _response(single_mass_suspension(MASS, lag), "position", s)
     plate = _response(single_mass_structure(MASS, lag), "plate", s)
+    # The models' input is the ground's force k u + b u̇; times (b s + k) it becomes the ground's
+    # motion.
     deviation = max(float(np.max(np.abs(each * spring / printed - 1.0))) for each in (force, plate))
     note = "with the ground's share of the force filtered too, which (5.13) leaves out"
     return statement(
@@ -112,6 +114,7 @@ def _cardano() -> list[Entry]:
     """Return the entries of Cardano's root (5.18), with (5.21) to (5.24), of the cubic (5.17)."""
     tau = 0.1
     m, k, b = MASS
+    # (5.17) divided by m τ: s³ + s²/τ + b s/(m τ) + k/(m τ), coefficients rising.
     cubic = np.polynomial.Polynomial([k / (tau * m), b / (tau * m), 1.0 / tau, 1.0])
 
     def remainder(a: float, b_: float) -> float:
@@ -166,6 +169,7 @@ def _double_lag() -> list[Entry]:
     def phase(frequency: float) -> float:
         return math.degrees(-2.0 * math.atan(frequency * FILTER))
 
+    # 2 atan(ω T) = 45°, solved numerically to check the printed 41.4 rad/s.
     at_45_degrees = _root(lambda frequency: phase(frequency) + 45.0)
     frequencies = np.linspace(0.1, 0.999, 200) * at_45_degrees
     # Both filters lag by 45° at the same frequency; below it they differ slightly.
@@ -178,10 +182,9 @@ def _double_lag() -> list[Entry]:
         critical = critical_lag(single_mass(SOFT._replace(stiffness=stiffness), lags))
         return (critical.time if critical else math.inf) - lag
 
-    first, second = (
-        _root(lambda k: excess(k, 1, 1.0 / at_45_degrees)),
-        _root(lambda k: excess(k, 2, FILTER)),
-    )
+    # The stiffness at which the lag is critical, with the damping of 1 Ns/m: numerically k/b.
+    first = _root(lambda k: excess(k, 1, 1.0 / at_45_degrees))
+    second = _root(lambda k: excess(k, 2, FILTER))
     safe = f"up to 45° the second order filter is ahead by {min(lead):.2g} to {max(lead):.2g}°"
     return [
         digits("§5.1.6", "frequency of 45° lag", "41.4", at_45_degrees, "rad/s"),

@@ -9,16 +9,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 from experiments.thesis import judges, resemblance, shapes
-from experiments.thesis.judges import Judge
-from experiments.thesis.loci import (
-    Claim,
-    LocusCase,
-    LocusFigure,
-    locus,
-    of_damping_ratio,
-    of_lag,
-    of_natural_frequency,
-)
+from experiments.thesis.appendix_a import claim, locus_case
+from experiments.thesis.loci import LocusCase, locus, of_damping_ratio, of_lag, of_natural_frequency
 from rigtwin.studies.stability.locus import BODY
 
 MODEL = "single-mass"
@@ -33,30 +25,25 @@ QUICK = {
 RATIOS = {lag: replace(of_damping_ratio(lag), symbol="k = m") for lag in (0.2, 0.01, 0.001)}
 
 
-def _claim(figure: str, topic: str, words: str, judge: Judge, note: str = "") -> Claim:
-    """Return a claim about a figure, such as `5.7`."""
-    return Claim(f"Figure {figure}", topic, words, judge, note)
-
-
 def _table_5_3() -> tuple[LocusCase, ...]:
     """Return the cases of Table 5.3: the lag is swept at two damping ratios."""
     # At the critical lag τ = b/k the damping vanishes, and the mass swings at √(k/m).
     cases = []
     for number, ratio in ((1, 1.0), (2, 0.5)):
         claims = [
-            _claim(
+            claim(
                 "5.7", "smallest lag", "the filter's pole is on the far left", shapes.far_left(1)
             ),
-            _claim(
+            claim(
                 "5.7", "stability", "unstable as the lag increases", judges.becomes_unstable(BODY)
             ),
-            _claim(
+            claim(
                 "5.8",
                 "small lags",
                 "the poles match the ideal ones",
                 resemblance.resembles("start"),
             ),
-            _claim(
+            claim(
                 "5.8",
                 "boundary",
                 "resembles an undamped mass on a spring",
@@ -65,14 +52,12 @@ def _table_5_3() -> tuple[LocusCase, ...]:
         ]
         if number == 1:
             claims.append(
-                _claim(
+                claim(
                     "5.8", "critically damped", "moves away from the real axis", shapes.breaks_away
                 )
             )
-        panels = (LocusFigure("5.7"), LocusFigure("5.8", (-12.0, 2.0, 6.0)))
-        cases.append(
-            LocusCase(MODEL, f"case {number}, ζ = {ratio:g}", LAGS[ratio], panels, tuple(claims))
-        )
+        panels = {"5.7": None, "5.8": (-12.0, 2.0, 6.0)}
+        cases.append(locus_case(MODEL, number, f"ζ = {ratio:g}", LAGS[ratio], panels, *claims))
     return tuple(cases)
 
 
@@ -82,7 +67,7 @@ def _table_5_4() -> tuple[LocusCase, ...]:
     cases = []
     for number, ratio, figure in ((1, 1.0, "5.9"), (2, 1.5, "5.10"), (3, 0.5, "5.11")):
         claims = [
-            _claim(
+            claim(
                 figure,
                 "stability",
                 "unstable as the natural frequency increases",
@@ -92,7 +77,7 @@ def _table_5_4() -> tuple[LocusCase, ...]:
         if ratio > 0.5:
             further_left = shapes.ends_left_of(locus(MODEL, SLOW[0.5]), "ζ = 0.5")
             claims.append(
-                _claim(
+                claim(
                     figure,
                     "end of the sweep",
                     "further right for lower damping ratios",
@@ -100,19 +85,15 @@ def _table_5_4() -> tuple[LocusCase, ...]:
                 )
             )
         cases.append(
-            LocusCase(
-                MODEL,
-                f"case {number}, ζ = {ratio:g}, τ = 0.2 s",
-                SLOW[ratio],
-                (LocusFigure(figure),),
-                tuple(claims),
+            locus_case(
+                MODEL, number, f"ζ = {ratio:g}, τ = 0.2 s", SLOW[ratio], {figure: None}, *claims
             )
         )
     for number, ratio, figure in ((4, 1.0, "5.12"), (5, 1.5, "5.13"), (6, 0.5, "5.14")):
         slow = locus(MODEL, SLOW[ratio])
         claims = [
-            _claim(figure, "stability", "no instability at 44.72 rad/s", judges.stable_throughout),
-            _claim(
+            claim(figure, "stability", "no instability at 44.72 rad/s", judges.stable_throughout),
+            claim(
                 figure,
                 "end of the sweep",
                 "a much higher frequency",
@@ -121,14 +102,10 @@ def _table_5_4() -> tuple[LocusCase, ...]:
         ]
         if ratio >= 1.0:
             further_left = shapes.breaks_away_left_of(slow, "τ = 0.2 s")
-            claims.append(_claim(figure, "breakaway", "further left with less lag", further_left))
+            claims.append(claim(figure, "breakaway", "further left with less lag", further_left))
         cases.append(
-            LocusCase(
-                MODEL,
-                f"case {number}, ζ = {ratio:g}, τ = 0.01 s",
-                QUICK[ratio],
-                (LocusFigure(figure),),
-                tuple(claims),
+            locus_case(
+                MODEL, number, f"ζ = {ratio:g}, τ = 0.01 s", QUICK[ratio], {figure: None}, *claims
             )
         )
     return tuple(cases)
@@ -139,57 +116,53 @@ def _table_5_5() -> tuple[LocusCase, ...]:
     # The sweep starts at the high ratio, so `start` of a judge means strong damping.
     slow, quick = (locus(MODEL, RATIOS[lag]) for lag in (0.2, 0.01))
     further = shapes.asymptote_left_of(slow, "τ = 0.2 s")
+    # ζ = b/(2 √(k m)) = b/(2 k) with b = 100 Ns/m and k = m.
     at_ratio_0_005 = 1e4  # k = m, in N/m and kg
     note = "at 0.005 it is on the boundary, b/k = τ, and below it, in the printed range, unstable"
     low = (-0.6, 0.2, 1.6)
     return (
-        LocusCase(
+        locus_case(
             MODEL,
-            "case 1, τ = 0.2 s",
+            1,
+            "τ = 0.2 s",
             RATIOS[0.2],
-            (LocusFigure("5.15"), LocusFigure("5.16", low)),
-            (
-                _claim("5.15", "high ratios", "vertical asymptote", shapes.asymptote("start")),
-                _claim("5.16", "low ratios", "unstable", judges.becomes_unstable(BODY)),
-            ),
+            {"5.15": None, "5.16": low},
+            claim("5.15", "high ratios", "vertical asymptote", shapes.asymptote("start")),
+            claim("5.16", "low ratios", "unstable", judges.becomes_unstable(BODY)),
         ),
-        LocusCase(
+        locus_case(
             MODEL,
-            "case 2, τ = 0.01 s",
+            2,
+            "τ = 0.01 s",
             RATIOS[0.01],
-            (LocusFigure("5.17"), LocusFigure("5.18", low)),
-            (
-                _claim(
-                    "5.17", "high ratios", "asymptote further left, frequencies higher", further
-                ),
-                _claim(
-                    "5.18",
-                    "damping ratio 0.005",
-                    "does not cause instability",
-                    judges.not_unstable_at(at_ratio_0_005),
-                    note,
-                ),
+            {"5.17": None, "5.18": low},
+            claim("5.17", "high ratios", "asymptote further left, frequencies higher", further),
+            claim(
+                "5.18",
+                "damping ratio 0.005",
+                "does not cause instability",
+                judges.not_unstable_at(at_ratio_0_005),
+                note,
             ),
         ),
-        LocusCase(
+        locus_case(
             MODEL,
-            "case 3, τ = 0.001 s",
+            3,
+            "τ = 0.001 s",
             RATIOS[0.001],
-            (LocusFigure("5.19"), LocusFigure("5.20", low)),
-            (
-                _claim("5.19", "high ratios", "no asymptote", shapes.pairs_at_start(0, 0)),
-                _claim(
-                    "5.19",
-                    "resemblance",
-                    "far better than with more lag",
-                    resemblance.closer_than(quick, "τ = 0.01 s"),
-                ),
-                _claim(
-                    "5.20",
-                    "damping ratio 0.005",
-                    "does not cause instability",
-                    judges.not_unstable_at(at_ratio_0_005),
-                ),
+            {"5.19": None, "5.20": low},
+            claim("5.19", "high ratios", "no asymptote", shapes.pairs_at_start(0, 0)),
+            claim(
+                "5.19",
+                "resemblance",
+                "far better than with more lag",
+                resemblance.closer_than(quick, "τ = 0.01 s"),
+            ),
+            claim(
+                "5.20",
+                "damping ratio 0.005",
+                "does not cause instability",
+                judges.not_unstable_at(at_ratio_0_005),
             ),
         ),
     )

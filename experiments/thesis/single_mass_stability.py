@@ -49,6 +49,7 @@ def _pole_entries(
     where: str, system: str, printed: Sequence[str], computed: np.ndarray, notes: Mapping[str, str]
 ) -> list[Entry]:
     """Return entries for the printed poles, each with its computed counterpart."""
+    # Python writes the imaginary unit as j.
     values = np.array([complex(text.replace(" ", "").replace("i", "j")) for text in printed])
     # The square root favours exact pairs, so a single misprint does not disturb the other pairs.
     rows, columns = linear_sum_assignment(np.sqrt(np.abs(values[:, None] - computed[None, :])))
@@ -137,9 +138,8 @@ def conclude(results: Mapping[str, Result]) -> Conclusion:
 REMARKS = (
     "(5.7) and (5.16) print −k and −b where +k and +b stand on that "
     "side, and (5.16) +1/τ for −1/τ of the lagged velocity.",
-    "Table 5.1: the structure's state-space model has one pole more, at "
-    "−1/τ, which no output sees; the table misprints it for "
-    "τ = 0.5 s.",
+    "Table 5.1: the structure's state-space model has one pole more, at −1/τ, which no output "
+    "sees; the table misprints it for τ = 0.5 s.",
 )
 STUDY = ThesisStudy(
     "single-mass-stability",

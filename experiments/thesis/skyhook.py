@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 
 import numpy as np
 
@@ -10,7 +11,16 @@ from experiments import find
 from experiments.thesis import ride
 from experiments.thesis.entry import Entry, band, digits, statement
 from experiments.thesis.ride import MEASURED, SHOWN_SEED
-from experiments.thesis.study import Conclusion, Drawing, Job, Result, ThesisStudy, sheet, span
+from experiments.thesis.study import (
+    Conclusion,
+    Drawing,
+    Job,
+    Result,
+    ThesisStudy,
+    sheet,
+    span,
+    trace,
+)
 from experiments.thesis.trial import over_seeds, seeded, trial, vehicle
 from rigtwin.render.plot import ASKED, SENSED
 from rigtwin.render.style import COLOURS
@@ -40,16 +50,10 @@ def _run(name: str, seed: int) -> Result:
 
 def jobs(seeds: int) -> Mapping[str, Job]:
     """Return the jobs of the study."""
-    return seeded(
-        {
-            name: lambda seed, name=name: _run(name, seed)
-            for name in ("passive", "semi-active", *GAINS)
-        },
-        seeds,
-    )
+    return seeded({name: partial(_run, name) for name in ("passive", "semi-active", *GAINS)}, seeds)
 
 
-def _entries(results: dict[str, Result]) -> list[Entry]:
+def _entries(results: Mapping[str, Result]) -> list[Entry]:
     """Return all entries of §7.1 and of appendices B1 and B2."""
     configuration = find("semi-active").configuration
     settings = configuration.controller
@@ -87,7 +91,7 @@ def _entries(results: dict[str, Result]) -> list[Entry]:
     return entries + _statements(results)
 
 
-def _statements(results: dict[str, Result]) -> list[Entry]:
+def _statements(results: Mapping[str, Result]) -> list[Entry]:
     """Return the entries of what §7.1 says about its figures."""
 
     def all_of(name: str, value: str) -> np.ndarray:
@@ -104,6 +108,7 @@ def _statements(results: dict[str, Result]) -> list[Entry]:
         all_of("semi-active", "travel rms") / all_of("active", "travel rms") - 1
     )
     travels_less = all_of("semi-active", "travel rms") < all_of("passive", "travel rms")
+    # A switch at every reversal of the body would be about 4 a second on this road.
     switches = all_of("semi-active", "switches")
     return [
         statement(
@@ -141,7 +146,7 @@ def _statements(results: dict[str, Result]) -> list[Entry]:
     ]
 
 
-def _forces(results: dict[str, Result]) -> Drawing:
+def _forces(results: Mapping[str, Result]) -> Drawing:
     """Draw the demanded damping forces and the coefficient of the semi-active damper."""
     figure, axes = sheet(3, 1, height=2.2)
     for name, axis in (("semi-active", axes[0][0]), ("active", axes[2][0])):
@@ -150,13 +155,11 @@ def _forces(results: dict[str, Result]) -> Drawing:
             (name, SENSED if name == "semi-active" else ASKED),
         ):
             result = results[f"{label}/{SHOWN_SEED}"]
-            axis.plot(
-                result["time"], result["asked damper"], color=colour, linewidth=0.8, label=label
-            )
+            trace(axis, result, "asked damper", color=colour, linewidth=0.8, label=label)
         axis.set(ylabel="damping force, N", xlim=(0, 15))
         axis.legend(fontsize=8)
     result = results[f"semi-active/{SHOWN_SEED}"]
-    axes[1][0].plot(result["time"], result["damping"], color=SENSED, linewidth=0.6)
+    trace(axes[1][0], result, "damping", color=SENSED, linewidth=0.6)
     axes[1][0].set(ylabel="damper, Ns/m", xlim=(0, 15))
     axes[2][0].set(xlabel="time, s")
     return Drawing(
@@ -167,7 +170,7 @@ def _forces(results: dict[str, Result]) -> Drawing:
     )
 
 
-def _box(results: dict[str, Result]) -> Drawing:
+def _box(results: Mapping[str, Result]) -> Drawing:
     """Draw the accelerations over the seeds as boxes, beside the ideal and the thesis."""
     figure, axes = sheet(1, 2, height=3.2)
     for axis, printed in ((axes[0][0], TABLE_7_3), (axes[0][1], TABLE_7_2)):
@@ -208,11 +211,10 @@ def _box(results: dict[str, Result]) -> Drawing:
 
 def conclude(results: Mapping[str, Result]) -> Conclusion:
     """Return the entries, drawings and remarks of §7.1."""
-    by_key = dict(results)
-    shown = {name: by_key[f"{name}/{SHOWN_SEED}"] for name in ("passive", "semi-active", "active")}
-    gains = {f"{gain:g} Ns/m": by_key[f"{name}/{SHOWN_SEED}"] for name, gain in GAINS.items()}
+    shown = {name: results[f"{name}/{SHOWN_SEED}"] for name in ("passive", "semi-active", "active")}
+    gains = {f"{gain:g} Ns/m": results[f"{name}/{SHOWN_SEED}"] for name, gain in GAINS.items()}
     drawings = [
-        _forces(by_key),
+        _forces(results),
         ride.histories("figure-7.4", "Figure 7.4 to 7.6", "Active skyhook, three gains.", gains),
         ride.histories(
             "figure-7.7",
@@ -220,14 +222,14 @@ def conclude(results: Mapping[str, Result]) -> Conclusion:
             "Passive, semi-active and active skyhook.",
             shown,
         ),
-        _box(by_key),
+        _box(results),
     ]
-    remarks = [ride.remark(by_key, name) for name in ("passive", "semi-active", *GAINS)]
+    remarks = [ride.remark(results, name) for name in ("passive", "semi-active", *GAINS)]
     remarks.append(
         f"{MEASURED}; below the twin's limit cycle by friction, at "
         "3.4 Hz and above, whose tail is still in it"
     )
-    return Conclusion(_entries(by_key), drawings, remarks)
+    return Conclusion(_entries(results), drawings, remarks)
 
 
 STUDY = ThesisStudy(

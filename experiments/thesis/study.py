@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
+import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from experiments.thesis.entry import Entry
 from rigtwin.numerics.arrays import Array
@@ -95,6 +99,17 @@ class ThesisStudy:
 def span(kind: str, chapter: str, first: int, last: int) -> tuple[str, ...]:
     """Return consecutive names: span("Figure", "5.", 7, 20) is `Figure 5.7` to `Figure 5.20`."""
     return tuple(f"{kind} {chapter}{number}" for number in range(first, last + 1))
+
+
+def trace(
+    axis: Axes,
+    result: Result,
+    name: str,
+    shown: slice | NDArray[np.bool_] = slice(None),
+    **style: Any,
+) -> None:
+    """Plot a stored signal over its time; shown: part of the ticks."""
+    axis.plot(np.asarray(result["time"])[shown], np.asarray(result[name])[shown], **style)
 
 
 def sheet(

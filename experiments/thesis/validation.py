@@ -9,7 +9,16 @@ from scipy.signal import csd, welch
 
 from experiments import find
 from experiments.thesis.entry import Entry, digits, factor, statement
-from experiments.thesis.study import Conclusion, Drawing, Job, Result, ThesisStudy, sheet, span
+from experiments.thesis.study import (
+    Conclusion,
+    Drawing,
+    Job,
+    Result,
+    ThesisStudy,
+    sheet,
+    span,
+    trace,
+)
 from experiments.thesis.trial import ThesisTrial, curves, errors, over_seeds, seeded, trial
 from rigtwin.render.plot import ASKED, SENSED
 from rigtwin.render.style import COLOURS
@@ -60,6 +69,7 @@ def _acceleration_response(test: ThesisTrial) -> tuple[np.ndarray, np.ndarray, n
     """
     period = test.configuration.timing.period
     ground = np.gradient(test.simulation.commands[:, 0], period)
+    # Windows of 20 s resolve 0.05 Hz; they overlap by three quarters.
     options = {"fs": 1 / period, "nperseg": 20_000, "noverlap": 15_000, "detrend": "linear"}
     frequencies, power = welch(ground, **options)
     shown = (frequencies > 0) & (frequencies <= 2.0)
@@ -128,10 +138,8 @@ def _entries(results: Mapping[str, Result]) -> list[Entry]:
             "Figure 3.11", "first swing", "overshoots the ideal", bool(np.all(overshoot > 0)), text
         )
     )
-    road, still = (
-        _value(results, "single-mass-road", "position_e1"),
-        _value(results, "single-mass", "position_e1"),
-    )
+    road = _value(results, "single-mass-road", "position_e1")
+    still = _value(results, "single-mass", "position_e1")
     text = f"{np.median(road):.4f} m against {np.median(still):.4f} m"
     holds = bool(np.median(road) < np.median(still))
     note = "" if holds else "of a road with other phases; the lab's is not known"
@@ -150,21 +158,9 @@ def _time_panels(result: Result, title: str) -> Drawing:
         (axes[0][0], "ideal plate", "asked position", "plate", "mm"),
         (axes[0][1], "ideal force", "asked force", "force", "N"),
     ):
-        axis.plot(time[early], np.asarray(result[quantity])[early], color=IDEAL, label="ideal")
-        axis.plot(
-            time[early],
-            np.asarray(result[asked])[early],
-            color=ASKED,
-            linewidth=1.0,
-            label="demanded",
-        )
-        axis.plot(
-            time[early],
-            np.asarray(result[sensed])[early],
-            color=SENSED,
-            linewidth=0.7,
-            label="twin",
-        )
+        trace(axis, result, quantity, early, color=IDEAL, label="ideal")
+        trace(axis, result, asked, early, color=ASKED, linewidth=1.0, label="demanded")
+        trace(axis, result, sensed, early, color=SENSED, linewidth=0.7, label="twin")
         axis.set(xlabel="time, s", ylabel=unit)
         axis.legend(fontsize=8, framealpha=0.85)
     axes[0][0].set_title(f"{title}: sprung mass")
@@ -174,20 +170,8 @@ def _time_panels(result: Result, title: str) -> Drawing:
         (axes[1][0], "asked position", "plate", "mm"),
         (axes[1][1], "asked force", "force", "N"),
     ):
-        axis.plot(
-            time[close],
-            np.asarray(result[asked])[close],
-            color=ASKED,
-            linewidth=1.0,
-            label="demanded",
-        )
-        axis.plot(
-            time[close],
-            np.asarray(result[sensed])[close],
-            color=SENSED,
-            linewidth=0.9,
-            label="twin",
-        )
+        trace(axis, result, asked, close, color=ASKED, linewidth=1.0, label="demanded")
+        trace(axis, result, sensed, close, color=SENSED, linewidth=0.9, label="twin")
         axis.set(title="tracking, close up", xlabel="time, s", ylabel=unit)
         axis.legend(fontsize=8, framealpha=0.85)
     number = "3.11 to 3.14" if "drop" in title else "3.15 to 3.17"
@@ -224,6 +208,7 @@ def _response(results: Mapping[str, Result]) -> Drawing:
     for kind, colour, label in (("ideal response", IDEAL, "ideal"), ("response", SENSED, "twin")):
         median = np.median([np.asarray(result[kind]) for result in roads], axis=0)
         axis.semilogy(frequencies[inside], median[inside], color=colour, marker=".", label=label)
+        # Pale beyond the road's band, where both spectra are noise.
         axis.semilogy(frequencies[~inside], median[~inside], color=colour, alpha=0.35)
     axis.axvline(0.576, color="black", linewidth=0.6, linestyle=":")
     axis.set(

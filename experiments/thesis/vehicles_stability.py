@@ -89,6 +89,7 @@ def drop(system: StateSpace, car: QuarterCar, time: np.ndarray) -> dict[str, np.
 def _start(system: StateSpace, car: QuarterCar) -> np.ndarray:
     """Return the initial state, relative to the rest after the drop, with every filter settled."""
     force = UNLOADED * car.sprung_mass * Settings().gravity
+    # Before the release both springs lack the unsupported force F, and are longer by F/k.
     travel, wheel = force / car.suspension_stiffness, force / car.tyre_stiffness
     start = {
         "force": force,
@@ -122,15 +123,14 @@ def _entries(cars: Mapping[str, QuarterCar]) -> list[Entry]:
     for name, body, wheel, _ in SHOWN:
         pole, note = growth(cars[name]), CAR_NOTE if name == "car" else ""
         for figure in (body, wheel):
-            where, words = (
-                f"Figure {figure.partition(',')[0]}",
-                f"{pole.real:+.3f} ± {pole.imag:.2f}j 1/s",
-            )
+            where = f"Figure {figure.partition(',')[0]}"
+            words = f"{pole.real:+.3f} ± {pole.imag:.2f}j 1/s"
             entries.append(
                 statement(
                     where, f"{name}, four lags of 10 ms", "unstable", pole.real > 0.0, words, note
                 )
             )
+    # Real part of the rightmost pole: the rate at which the fastest mode grows.
     rates = {name: growth(car).real for name, car in cars.items()}
     slow = (rates["car, 40 kg wheel"], rates["motorcycle"])
     words = ", ".join(f"{name} {rate:+.3g} 1/s" for name, rate in rates.items())
@@ -206,6 +206,7 @@ def _share(car: QuarterCar, part: str) -> float:
     """Return the initial amplitude of the rightmost mode in a drop, m."""
     system = rig(car, RIG)
     values, vectors = np.linalg.eig(np.asarray(system.A))
+    # The initial state as a sum of modes: V w = x(0).
     weights = np.linalg.solve(vectors, _start(system, car))
     row, column = system.state_labels.index(part), int(np.argmax(values.real))
     # The pair of conjugate modes adds up to twice the modulus of one.

@@ -66,6 +66,7 @@ def run_studies(
         progress(count, total)
 
     with Store(folder / "results.sqlite") as store:
+        # Jobs travel as names, since closures cannot be pickled for another process.
         jobs = [
             (f"{study}/{key}", (study, seeds, key))
             for study, keys_of_study in keys.items()

@@ -44,6 +44,7 @@ def find_study(
     RigtwinError
         If no study has this name, or its file is invalid.
     """
+    # A shipped study's name comes before a file of that name in the working folder.
     path = STUDIES.get(name, Path(name))
     if path.suffix != ".toml" and not path.exists():
         known = ", ".join(STUDIES)

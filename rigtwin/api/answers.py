@@ -1,4 +1,4 @@
-"""Questions to recordings: diagnosis, changes, comparison with the twin, calibration."""
+"""Questions to recordings: diagnosis, changes, calibration."""
 
 from __future__ import annotations
 
@@ -7,27 +7,15 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rigtwin.api.describing import describe, needs_description, record_log
-from rigtwin.api.machines import (
-    Effects,
-    Settings,
-    described_machine,
-    effect_texts,
-    machine_of,
-    names_of,
-    require_unrecorded,
-    twin_of,
-)
+from rigtwin.api.machines import described_machine, machine_of
 from rigtwin.api.recordings import resolve_recording
+from rigtwin.api.twin import Settings, names_of, require_unrecorded, twin_of
 from rigtwin.description.machine import Machine
 from rigtwin.diagnosis.change import Changes
 from rigtwin.diagnosis.changes import find_changes
-from rigtwin.diagnosis.compare import Comparison, differences
-from rigtwin.diagnosis.compare import compare as compare_with_twin
-from rigtwin.diagnosis.compare import compare_recordings as find_differences
 from rigtwin.diagnosis.data_checks import require_fit
 from rigtwin.diagnosis.diagnose import diagnose as find_reasons
 from rigtwin.diagnosis.first_look import FirstLook as FirstLook
-from rigtwin.diagnosis.residual import Residual
 from rigtwin.diagnosis.result import Diagnosis
 from rigtwin.errors import RigtwinError
 from rigtwin.recording import reader
@@ -111,6 +99,7 @@ def diagnose(
     ['viscous@motor']
     """
     data = read_data(recordings, machine, held_out, columns, test)
+    # Excluded effects leave the machine itself, so that no later step can propose them again.
     described = data.machine.excluding(names_of("exclude", exclude))
     require_unrecorded(settings, described, [*data.recordings, *data.held_out])
     base = twin_of(described, settings, without)
@@ -166,6 +155,7 @@ def read_data(
     if needs_description(machine, logs):
         if not logs:
             raise RigtwinError("no recording to diagnose")
+        # The first log decides on columns and units; the others must follow it to be comparable.
         described = describe(machine, logs[0], columns=columns, test=test)  # type: ignore[arg-type]
         recordings = [record_log(described, log) for log in logs]
         held_out = [record_log(described, log) for log in _as_list(held_out)]
@@ -229,6 +219,7 @@ def what_changed(
     >>> changes = rigtwin.what_changed(["monday.mcap", "friday.mcap"])  # doctest: +SKIP
     >>> [parameter.name for parameter in changes.changed]  # doctest: +SKIP
     """
+    # The order is kept: it is the order of time, in which a change is looked for.
     loaded = [resolve_recording(recording) for recording in _as_list(recordings)]
     if _has_duplicate(loaded):
         raise RigtwinError("a recording is named twice; expected different recordings")
@@ -237,95 +228,6 @@ def what_changed(
     described = described_machine(loaded[0], machine).excluding(names_of("exclude", exclude))
     require_unrecorded(settings, described, loaded)
     return find_changes(described, loaded, twin_of(described, settings, without), progress)
-
-
-def compare(
-    recording: Recorded,
-    *,
-    machine: Machine | str | Path | None = None,
-    settings: Settings = (),
-    effects: Effects = (),
-    progress: Callable[[str], object] = lambda _replay: None,
-) -> Comparison:
-    """Compare a recording with its twin.
-
-    On the suspension rig, every component is replayed: driven by its recorded inputs, its output is
-    compared with the recorded one. On any other machine the signals are compared one by one.
-
-    Parameters
-    ----------
-    recording
-        Recording, or its path.
-    machine
-        Machine the recording belongs to, or its name, or the path of its description. Defaults to
-        the one named in the recording.
-    settings
-        Changes of the twin: of its plant and `timing.timestep`. All other settings are the
-        recording's own.
-    effects
-        Effects added to the twin, such as {"coulomb@rail": 80}.
-    progress
-        Function called with the name of each replay.
-
-    Returns
-    -------
-    Comparison
-        `replays`, replay → `Residual` with the residual's rms, its noise floor (both in `unit`),
-        their `ratio` (1 is noise alone) and the band of most of its power in Hz; `left_out`,
-        replay → reason why it was impossible; ``notes``; ``gap``, the rms of all residuals in units
-        of white noise.
-
-    Raises
-    ------
-    RigtwinError
-        If the data make a comparison meaningless; the message names every fault.
-
-    Examples
-    --------
-    >>> import rigtwin
-    >>> recording = rigtwin.run("emps", "positioning", effects={"coulomb@guide": 20})
-    >>> rigtwin.compare(recording).gap > 2.0
-    True
-    """
-    recording = resolve_recording(recording)
-    described = described_machine(recording, machine)
-    require_unrecorded(settings, described, [recording])
-    base = twin_of(described, settings, (), effect_texts(effects))
-    configuration = described.configuration_of(recording, base)
-    return compare_with_twin(described, recording, configuration, progress)
-
-
-def compare_recordings(
-    first: Recorded, second: Recorded
-) -> tuple[dict[str, Residual], tuple[str, ...]]:
-    """Compare two recordings of one test, sensor by sensor and tick by tick.
-
-    Parameters
-    ----------
-    first, second
-        Recordings of one machine, or their paths. Both need the same period.
-
-    Returns
-    -------
-    residuals : dict
-        Sensor → `Residual` of the difference: its rms and noise floor (both in `unit`), and their
-        ratio. A ratio of 1 is noise alone.
-    differences : tuple of str
-        Test conditions that differ, one line each.
-
-    Raises
-    ------
-    RigtwinError
-        If the periods differ or the recordings share no sensor.
-
-    Examples
-    --------
-    >>> residuals, differences = rigtwin.compare_recordings(
-    ...     "rig.mcap", "twin.mcap")  # doctest: +SKIP
-    >>> residuals["load_cell"].ratio  # doctest: +SKIP
-    """
-    first, second = resolve_recording(first), resolve_recording(second)
-    return find_differences(machine_of(first), first, second), differences(first, second)
 
 
 def calibrate(recording: Recorded) -> Calibration:
@@ -354,6 +256,8 @@ def calibrate(recording: Recorded) -> Calibration:
     configuration = machine.configuration_of(recording)
     require_fit(machine, recording, configuration)
     calibration = machine.physics.find_compensator(recording, configuration)
+    # A compensator that misses reversals or steps falsely adds force errors of twice the
+    # friction.
     if (
         calibration.detected < LEAST_DETECTED * calibration.reversals
         or calibration.false > MOST_FALSE * calibration.reversals
@@ -374,5 +278,6 @@ def _as_list(recordings: Recorded | Sequence[Recorded]) -> list[Recorded]:
 
 def _has_duplicate(recordings: Sequence[reader.Recording]) -> bool:
     """Return whether two recordings are the same file. Those in memory have none."""
+    # Resolved, since links and relative paths may name one file twice.
     paths = [recording.path.resolve() for recording in recordings if recording.path.exists()]
     return len(set(paths)) < len(paths)

@@ -79,6 +79,7 @@ def _mistake(
         expected = _evaluate(parameter.annotation, namespace)
         if not fits(value, expected):
             return f"{name} {value!r:.60}: expected {describe(expected)}"
+        # A null character would end the path in the system's calls, and names another file.
         if isinstance(value, str | Path) and "\0" in str(value):
             return f"{name} {value!r:.60}: expected text without a null character"
     return None
@@ -127,6 +128,8 @@ def fits(value: Any, expected: Any) -> bool:
         return value is None
     try:
         return isinstance(value, expected)
+    # Some annotations, such as protocols, cannot be tested by isinstance; they let everything
+    # pass.
     except TypeError:
         return True
 
@@ -160,6 +163,7 @@ def describe(expected: Any) -> str:
     """
     kind, inner = get_origin(expected), get_args(expected)
     if kind in (Union, UnionType):
+        # A dictionary drops repeated names, such as those of two kinds of function.
         *options, last = dict.fromkeys(describe(option) for option in inner)
         return f"{', '.join(options)} or {last}" if options else last
     if kind is Literal:

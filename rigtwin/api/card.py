@@ -11,7 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from machines import DEFAULT_MACHINE
-from rigtwin.api.machines import Effects, Settings, effect_texts, resolve_machine
+from rigtwin.api.machines import resolve_machine
+from rigtwin.api.twin import Effects, Settings, effect_texts
 from rigtwin.description.changes import with_changes
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.effects import apply_effects
@@ -25,9 +26,10 @@ from rigtwin.hardware.daq.calibration import (
     set_zeros,
     sign_off,
 )
-from rigtwin.hardware.daq.card import require_client
+from rigtwin.hardware.daq.driver import require_client
 from rigtwin.hardware.daq.failsafe import release
-from rigtwin.hardware.daq.table import OUTPUTS, ChannelTable, load_table, require_ranges, to_toml
+from rigtwin.hardware.daq.table import OUTPUTS, ChannelTable, require_ranges
+from rigtwin.hardware.daq.table_file import load_table, to_toml
 from rigtwin.hardware.daq.virtual import RealTime, VirtualCard
 from rigtwin.hardware.session.stops import stop_requests
 from rigtwin.hardware.session.table_check import (
@@ -118,6 +120,7 @@ def serve_card(
     RigtwinError
         For a mistake in an argument, a port in use, or a missing package.
     """
+    # Before the imports below, which need the same optional package.
     require_client()
     from rigtwin.hardware.daq.transport import LOCAL, serve
 
@@ -128,12 +131,14 @@ def serve_card(
     actual = apply_effects(configuration, effect_texts(effects))
     table = load_table(Path(card), described.physics.signals(described))
     terminals = described.physics.terminals(described, actual, table, seed)
+    # In real time, since its clients run on clocks of their own.
     virtual = VirtualCard(terminals, table, RealTime(configuration.timing.period))
     server, open_port = serve(virtual, port)
     return ServedCard(
         table.device,
         f"{LOCAL}:{open_port}",
         lambda: virtual.tick,
+        # Half a second lets running calls end; then the port is free.
         lambda: server.stop(0.5).wait(),
     )
 
@@ -193,10 +198,8 @@ def check_card(
     ----------
     card
         Channel table to correct, TOML.
-    operator
-        Name of the person who calibrates. It is stored in the table.
-    note
-        Remark that is stored in the table.
+    operator, note
+        Name of the person who calibrates, and a remark. Both are stored in the table.
     zero
         Whether every input is at its reference value now, so that its zero can be set.
     references
@@ -209,10 +212,9 @@ def check_card(
         Stroke of the plates in m, used with `signs`, 0.005 by default.
     directions
         Known direction of motion: output → 1 or -1.
-    arm
-        Function that asks, before anything moves, whether everybody is clear of the rig.
-    ask
-        Function that asks in which direction an output moved, 1 or -1. A virtual card needs none.
+    arm, ask
+        Functions that ask, before anything moves, whether everybody is clear of the rig; and in
+        which direction an output moved, 1 or -1. A virtual card needs neither.
     virtual
         Channel table by which a virtual card is wired. The check then uses it in place of the rig.
     stop
@@ -237,30 +239,12 @@ def check_card(
     zeros, present, known = dict(references or {}), dict(spans or {}), dict(directions or {})
     _require_values(zeros, "reference", table)
     _require_values(present, "span", table)
-    if not LEAST_STROKE <= stroke <= MOST_STROKE:
-        raise RigtwinError(f"stroke {stroke:g}: expected {LEAST_STROKE:g} to {MOST_STROKE:g} m")
-    for name, sign in known.items():
-        if name not in OUTPUTS or sign not in (1, -1):
-            raise RigtwinError(
-                f"moved {name}: expected one of {', '.join(OUTPUTS)} and + or -, such as ground=+"
-            )
+    _require_motion(stroke, known)
     require_ranges(table, Configuration().safety)
     if not (signs or zero or present):
         raise RigtwinError("nothing to check: expected zero, span NAME=VALUE or signs")
     wiring = None if virtual is None else load_table(Path(virtual))
-
-    def find_direction(output: str) -> int:
-        if output in known:
-            return known[output]
-        if wiring is not None:
-            return direction_of_wiring(output, table, wiring)
-        if ask is None:
-            raise RigtwinError(f"direction of {output} is unknown: expected `directions` or `ask`")
-        return ask(output)
-
-    changes: tuple[str, ...] = ()
-    rest: tuple[RestReading, ...] = ()
-    corrected = table
+    corrected, changes, rest = table, (), ()
     # Signs first: zero and span depend on them. The span before the zero: the zero is set at the
     # corrected span.
     if signs:
@@ -268,15 +252,44 @@ def check_card(
             raise RigtwinError("not armed; nothing moved")
         with nullcontext(stop) if stop is not None else stop_requests() as stop_request:
             responses = move_outputs(table, wiring, stroke, stop_request)
-        moved = {output: find_direction(output) for output in OUTPUTS}
+        moved = {output: _direction(output, known, table, wiring, ask) for output in OUTPUTS}
         corrected, changes = correct_signs(table, responses, moved)
     if zero or present:
         rest = look_at_rest(corrected, wiring)
         show(rest)
         corrected = set_spans(corrected, rest, present) if present else corrected
         corrected = set_zeros(corrected, rest, zeros) if zero else corrected
+    # The corrections may have changed what a line can carry.
     require_ranges(corrected, Configuration().safety)
     return TableCheck(sign_off(corrected, operator, note, date.today()), rest, changes)
+
+
+def _require_motion(stroke: float, directions: Mapping[str, int]) -> None:
+    """Raise RigtwinError for a stroke in m, or directions of outputs, that are not allowed."""
+    if not LEAST_STROKE <= stroke <= MOST_STROKE:
+        raise RigtwinError(f"stroke {stroke:g}: expected {LEAST_STROKE:g} to {MOST_STROKE:g} m")
+    for name, sign in directions.items():
+        if name not in OUTPUTS or sign not in (1, -1):
+            raise RigtwinError(
+                f"moved {name}: expected one of {', '.join(OUTPUTS)} and + or -, such as ground=+"
+            )
+
+
+def _direction(
+    output: str,
+    known: Mapping[str, int],
+    table: ChannelTable,
+    wiring: ChannelTable | None,
+    ask: Callable[[str], int] | None,
+) -> int:
+    """Return the direction in which an output moved: as stated, as wired, or as a person says."""
+    if output in known:
+        return known[output]
+    if wiring is not None:
+        return direction_of_wiring(output, table, wiring)
+    if ask is None:
+        raise RigtwinError(f"direction of {output} is unknown: expected `directions` or `ask`")
+    return ask(output)
 
 
 def write_table(table: ChannelTable, path: str | Path) -> None:

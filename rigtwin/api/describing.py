@@ -107,6 +107,7 @@ def _is_recording(log: Log | reader.Recording) -> bool:
     """Return whether a log was recorded by rigtwin."""
     if isinstance(log, reader.Recording):
         return True
+    # Only an MCAP file can be a recording; ROS 2 bags have that ending as well.
     if not isinstance(log, str | Path) or Path(log).suffix.lower() != ".mcap":
         return False
     try:
@@ -136,6 +137,7 @@ def log_files(log: Log | reader.Recording) -> tuple[Path, ...]:
     if not isinstance(log, str | Path):
         return tuple(Path(file) for file in log)
     path = Path(log)
+    # A file whose own name holds the separator comes first.
     if SEPARATOR in str(log) and not path.exists():
         parts = tuple(Path(file) for file in str(log).split(SEPARATOR))
         if all(part.is_file() for part in parts):

@@ -6,13 +6,15 @@ import hashlib
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
 from rigtwin.api.answers import diagnose
-from rigtwin.api.machines import Settings, machine_of, machines, resolve_machine, tables_of, twin_of
+from rigtwin.api.machines import machine_of, machines, resolve_machine
 from rigtwin.api.recordings import resolve_recording
+from rigtwin.api.twin import Settings, tables_of, twin_of
 from rigtwin.console import finite
 from rigtwin.description.machine import Machine
 from rigtwin.errors import RigtwinError
@@ -76,6 +78,7 @@ class _Job:
 def _answer(job: _Job) -> dict[str, Any]:
     """Diagnose one recording. Runs in a worker process."""
     with TemporaryDirectory(prefix="rigtwin-") as folder:
+        # The job carries the content, since workers on other computers do not have the file.
         path = Path(folder) / _PLACEHOLDER
         path.write_bytes(job.data)
         try:
@@ -83,11 +86,13 @@ def _answer(job: _Job) -> dict[str, Any]:
                 path, machine=job.machine, settings=job.settings, without=job.without
             ).document()
         except RigtwinError as error:
+            # The temporary path must not be stored: it means nothing to the next reader.
             return {"error": str(error).replace(str(path), _PLACEHOLDER)}
         finally:
             # Without this, the process grows by several MB per recording.
             return_memory()
     text = json.dumps(finite(document), allow_nan=False)
+    # Without its quotes, the path as JSON writes it: backslashes of Windows are doubled there.
     return {"answer": text.replace(json.dumps(str(path))[1:-1], _PLACEHOLDER)}
 
 
@@ -143,58 +148,87 @@ def diagnose_each(
     _checked("cluster", cluster, str | None, "an address, such as tcp://host:8786")
     if isinstance(without, str) or not all(isinstance(name, str) for name in _list(without)):
         raise RigtwinError(f"without {without!r:.60}: expected a list of effects' names")
-    changes = tuple(tables_of(settings))
-    stated = None if machine is None else resolve_machine(machine)
-    try:
-        options = json.dumps([changes, sorted(without)], sort_keys=True)
-    except (TypeError, ValueError):
-        raise RigtwinError(f"settings {settings!r:.60}: expected numbers and text") from None
-    validated: set[Path] = set()
-    refused: dict[Path, str] = {}
-    keys: dict[Path, str] = {}
-
-    def jobs() -> Iterator[tuple[str, _Job]]:
-        for path in paths:
-            try:
-                data = path.read_bytes()
-                described = machine_of(resolve_recording(path)) if stated is None else stated
-            except (OSError, ValueError) as error:
-                reason = getattr(error, "strerror", None) or error
-                refused[path] = f"cannot read {printable(str(path))}: {reason}"
-            except RigtwinError as error:
-                refused[path] = str(error)
-            else:
-                if described.path not in validated:
-                    # Validate the settings once per machine: an invalid one ends the whole call.
-                    twin_of(described, changes, without)
-                    validated.add(described.path)
-                keys[path] = _digest(data, options.encode(), *map(Path.read_bytes, described.files))
-                yield (
-                    keys[path],
-                    _Job(data, _name(described), changes, tuple(without)),
-                )
-
-    done = 0
-
-    def count(more: int) -> None:
-        nonlocal done
-        done += more
-        progress(done + len(refused), len(paths))
-
+    batch = _Batch(paths, machine, settings, without)
     with Store(out / STORE) as store, open_workers(workers, cluster) as pool:
-        run_jobs(store, pool, _answer, jobs(), count)
-        answers = tuple(
-            Answered(path, None, refused[path])
-            if path in refused
-            else _read(path, store[key], out / STORE)
-            for path, key in ((path, keys.get(path, "")) for path in paths)
-        )
+        run_jobs(store, pool, _answer, batch.jobs(), partial(batch.count, progress))
+        answers = tuple(batch.answer(path, store) for path in paths)
+    _write_table(out / TABLE, answers)
+    return answers
+
+
+def _write_table(path: Path, answers: Sequence[Answered]) -> None:
+    """Write all answers by the recordings' paths."""
     table = {
         str(answer.path): {"error": answer.error} if answer.document is None else answer.document
         for answer in answers
     }
-    atomic_write(out / TABLE, json.dumps(table, indent=1, allow_nan=False) + "\n")
-    return answers
+    atomic_write(path, json.dumps(table, indent=1, allow_nan=False) + "\n")
+
+
+class _Batch:
+    """Recordings as jobs, or the reason why one cannot become a job."""
+
+    def __init__(
+        self,
+        paths: Sequence[Path],
+        machine: Machine | str | Path | None,
+        settings: Settings,
+        without: Sequence[str],
+    ) -> None:
+        self._paths, self._without = paths, tuple(without)
+        self._changes = tuple(tables_of(settings))
+        self._stated = None if machine is None else resolve_machine(machine)
+        try:
+            options = json.dumps([self._changes, sorted(without)], sort_keys=True)
+        except (TypeError, ValueError):
+            raise RigtwinError(f"settings {settings!r:.60}: expected numbers and text") from None
+        self._options = options.encode()
+        self._validated: set[Path] = set()
+        self._refused: dict[Path, str] = {}
+        self._keys: dict[Path, str] = {}
+        self._done = 0
+
+    def jobs(self) -> Iterator[tuple[str, _Job]]:
+        """Yield the key and the job of each recording that can be read.
+
+        Recordings are read when a worker is free, so that few are in memory at once.
+        """
+        for path in self._paths:
+            try:
+                data = path.read_bytes()
+                described = self._machine_of(path)
+            except (OSError, ValueError) as error:
+                reason = getattr(error, "strerror", None) or error
+                self._refused[path] = f"cannot read {printable(str(path))}: {reason}"
+            except RigtwinError as error:
+                self._refused[path] = str(error)
+            else:
+                if described.path not in self._validated:
+                    # Validate the settings once per machine: an invalid one ends the whole call.
+                    twin_of(described, self._changes, self._without)
+                    self._validated.add(described.path)
+                # The answer also depends on the description and its model, so their content enters
+                # the key.
+                files = map(Path.read_bytes, described.files)
+                self._keys[path] = _digest(data, self._options, *files)
+                yield self._keys[path], _Job(data, _name(described), self._changes, self._without)
+
+    def _machine_of(self, path: Path) -> Machine:
+        if self._stated is not None:
+            return self._stated
+        return machine_of(resolve_recording(path))
+
+    def count(self, progress: Callable[[int, int], object], more: int) -> None:
+        """Report finished jobs."""
+        self._done += more
+        # Refused recordings never become jobs, but are finished as well.
+        progress(self._done + len(self._refused), len(self._paths))
+
+    def answer(self, path: Path, store: Store) -> Answered:
+        """Return the answer about a recording, once all jobs are done."""
+        if path in self._refused:
+            return Answered(path, None, self._refused[path])
+        return _read(path, store[self._keys.get(path, "")], store.path)
 
 
 def _read(path: Path, result: Any, store: Path) -> Answered:
@@ -202,6 +236,7 @@ def _read(path: Path, result: Any, store: Path) -> Answered:
     try:
         if "error" in result:
             return Answered(path, None, result["error"].replace(_PLACEHOLDER, printable(str(path))))
+        # Escaped as inside a JSON text, because it is put into one.
         escaped = json.dumps(printable(str(path)))[1:-1]
         document = json.loads(result["answer"].replace(_PLACEHOLDER, escaped))
         _ = document["verdict"], document["sentence"]

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from rigtwin.api.machines import Settings, described_machine
+from rigtwin.api.machines import described_machine
 from rigtwin.api.recordings import resolve_recording
+from rigtwin.api.twin import Settings
 from rigtwin.description.changes import with_changes
 from rigtwin.description.machine import OWN, Machine
 from rigtwin.recording import reader
@@ -49,6 +50,8 @@ def energy_error(
     """
     recording = resolve_recording(recording)
     described = described_machine(recording, machine)
+    # With a user's controller the recording does not say what vehicle it emulates; only given
+    # settings do.
     custom = OWN in recording.controller and bool(settings)
     known = experiments_of(described)
     start = known[recording.experiment].configuration if recording.experiment in known else None

@@ -2,23 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from experiments import find
-from rigtwin.api.machines import Settings
+from rigtwin.api.twin import Settings
 from rigtwin.description.changes import with_changes
 from rigtwin.description.control import set_up
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq import CARD
-from rigtwin.hardware.daq.card import require_client
-from rigtwin.hardware.daq.table import load_table
-from rigtwin.hardware.faults.campaign import FaultResult, InjectedFault, draw_faults, try_fault
+from rigtwin.hardware.daq.driver import require_client
+from rigtwin.hardware.daq.table import ChannelTable
+from rigtwin.hardware.daq.table_file import load_table
+from rigtwin.hardware.faults.campaign import draw_faults, try_fault
 from rigtwin.hardware.faults.kinds import KINDS
+from rigtwin.hardware.faults.outcome import FaultResult, InjectedFault
 from rigtwin.hardware.faults.processes import try_process_fault
-from rigtwin.hardware.session.custom_controller import ControllerFactory, custom_controller
+from rigtwin.hardware.session.custom_controller import (
+    ControllerFactory,
+    CustomController,
+    custom_controller,
+)
+from rigtwin.simulation.experiment import Experiment
 
 MOST = 1000
 """Largest number of sessions per kind of fault."""
@@ -95,6 +102,23 @@ def faults(
         For a number out of range, an invalid setting, a mistake in the table, or a missing package.
     """
     require_client()
+    _require_counts(seed, per_kind, per_process_kind)
+    channels = load_table(Path(card))
+    custom = None if controller is None else custom_controller(controller)
+    todo = _draw(seed, per_kind, per_process_kind)
+    # A dictionary: each experiment's test is built once, however many faults use it.
+    tests = {
+        name: replace(test, configuration=with_changes(test.configuration, settings))
+        for name, test in ((fault.experiment, find(fault.experiment)) for fault in todo)
+    }
+    # Settings that the controller refuses are found before the first session starts.
+    for test in tests.values():
+        set_up(test.configuration.controller, test.configuration.timing.period)
+    return _run_sessions(todo, tests, channels, custom, progress)
+
+
+def _require_counts(seed: int, per_kind: int, per_process_kind: int) -> None:
+    """Raise RigtwinError for a seed or numbers of sessions out of range."""
     if seed < 0:
         raise RigtwinError(f"seed {seed}: expected 0 or more")
     for name, number in {
@@ -107,16 +131,16 @@ def faults(
         raise RigtwinError(
             "no session to run: expected per_kind (--each) or per_process_kind (--processes)"
         )
-    channels = load_table(Path(card))
-    custom = None if controller is None else custom_controller(controller)
-    todo = _draw(seed, per_kind, per_process_kind)
-    tests = {
-        name: replace(test, configuration=with_changes(test.configuration, settings))
-        for name, test in ((fault.experiment, find(fault.experiment)) for fault in todo)
-    }
-    # Settings that the controller refuses are found before the first session starts.
-    for test in tests.values():
-        set_up(test.configuration.controller, test.configuration.timing.period)
+
+
+def _run_sessions(
+    todo: Sequence[InjectedFault],
+    tests: Mapping[str, Experiment],
+    channels: ChannelTable,
+    controller: CustomController | None,
+    progress: Callable[[str, int, int], object],
+) -> Campaign:
+    """Run a session for each fault, until all are done or the operator interrupts."""
     results, undone, interrupted = list[FaultResult](), list[str](), False
     with TemporaryDirectory(prefix="rigtwin-faults-") as folder:
         try:
@@ -127,7 +151,8 @@ def faults(
                     if fault.kind.place == "process":
                         results.append(try_process_fault(*session))
                     else:
-                        results.append(try_fault(*session, custom))
+                        results.append(try_fault(*session, controller))
+                # A session that could not be run is reported, and does not end the campaign.
                 except RigtwinError as error:
                     undone.append(f"{fault.kind.name}, seed {fault.seed}: {error}")
         except KeyboardInterrupt:
@@ -142,5 +167,6 @@ def _draw(seed: int, per_kind: int, per_process_kind: int) -> list[InjectedFault
     killing = [kind for kind in KINDS if kind.place == "process"]
     return [
         *draw_faults(per_kind * len(within), seed, within),
+        # Another seed, or the two draws would be the same random numbers.
         *draw_faults(per_process_kind * len(killing), seed + 1, killing),
     ]

@@ -6,8 +6,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from rigtwin.api.answers import Recorded, read_data
-from rigtwin.api.machines import Settings, twin_of
+from rigtwin.api.answers import DiagnosisData, Recorded, read_data
+from rigtwin.api.twin import Settings, twin_of
+from rigtwin.components import Effect
+from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Machine
 from rigtwin.diagnosis.copies import drop_copies, refuse_copies
 from rigtwin.diagnosis.data_checks import require_fit
@@ -78,9 +80,17 @@ def fit(
     names = [effects] if isinstance(effects, str) else list(effects)
     if not all(isinstance(name, str) for name in names):
         raise RigtwinError(f"effects {effects!r:.60}: expected names such as 'coulomb@rail'")
-    chosen = find_effects(data.machine, names)
-    base = twin_of(data.machine, settings)
+    return _fit(data, find_effects(data.machine, names), twin_of(data.machine, settings), progress)
 
+
+def _fit(
+    data: DiagnosisData,
+    effects: Sequence[Effect],
+    base: Configuration,
+    progress: Callable[[int], object],
+) -> EffectFit:
+    """Fit effects to recordings, without copies and recordings that are too short."""
+    # Copies count twice in the fit, and held-out copies would be no test of it.
     recordings_kept, copies = drop_copies(data.recordings)
     refuse_copies(data.held_out, recordings_kept)
     fitted, short = drop_short(recordings_kept)
@@ -92,5 +102,5 @@ def fit(
             require_fit(data.machine, recording, configuration, least_ticks(tests))
         return Evidence(data.machine, tests, configurations)
 
-    result = fit_effects(gather(fitted), chosen, gather(judged) if judged else None, progress)
+    result = fit_effects(gather(fitted), effects, gather(judged) if judged else None, progress)
     return replace(result, warnings=(*copies, *short, *short_held_out, *result.warnings))

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rigtwin.api.machines import Settings, described_machine, twin_of
+from rigtwin.api.machines import described_machine
 from rigtwin.api.recordings import load, resolve_recording
+from rigtwin.api.twin import Settings, twin_of
 from rigtwin.api.watching import PATIENCE, watch
 from rigtwin.description.machine import Machine
 from rigtwin.errors import RigtwinError
@@ -102,9 +104,11 @@ def show_look(
         missing.
     """
     start = from_first_look(look) if diagnosis is None else read_diagnosis(diagnosis, look)
+    # Imported late: the page's packages are optional.
     with _needs_viser():
         from rigtwin.looking.local_server import open_server
         from rigtwin.looking.page import Page
+    # Opened last: everything that can be refused has been by now.
     server = open_server(port, f"{look.machine.title}: {look.recording.path.name}")
     return Page(server, look, start, _twin_file(look.recording.path, save_twin))
 
@@ -153,16 +157,9 @@ def show_live(
         from rigtwin.looking.local_server import LocalServer, open_server
         from rigtwin.looking.page import Page
 
-    def follow(on_update: Callable[[Watch], object], stop: Callable[[], bool]) -> Watch:
-        return watch(
-            path,
-            machine=machine,
-            settings=settings,
-            without=without,
-            on_update=on_update,
-            patience=patience,
-            stop=stop,
-        )
+    follow = partial(
+        watch, path, machine=machine, settings=settings, without=without, patience=patience
+    )
 
     def look_back(server: LocalServer, watched: Watch) -> Page:
         # While the test ran, only its last seconds were held in memory.

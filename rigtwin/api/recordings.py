@@ -1,21 +1,21 @@
-"""Recordings with their machine: channels, plots, videos, exports and imports."""
+"""Recordings with their machine: channels, plots, videos and exports."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from rigtwin.api.machines import Settings, machine_of, resolve_machine, twin_of
+from rigtwin.api.machines import machine_of, resolve_machine
+from rigtwin.api.twin import Settings, twin_of
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Machine
 from rigtwin.errors import RigtwinError
 from rigtwin.files import forbid_overwriting
-from rigtwin.importing.convert import Data, convert, convert_episodes
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import export, reader
 
@@ -77,12 +77,7 @@ class Recording(reader.Recording):
         return Path(out)
 
     def video(
-        self,
-        out: str | Path,
-        *,
-        ghost: float = 0.0,
-        settings: Settings = (),
-        **options: Any,
+        self, out: str | Path, *, ghost: float = 0.0, settings: Settings = (), **options: Any
     ) -> Path:
         """Film the machine in motion, with its signals beneath.
 
@@ -172,6 +167,7 @@ def _ghost(
         raise RigtwinError(f"{machine.name}: its twin moves as measured and has no ghost")
     measured, predicted = look.positions(), look.positions(look.nominal)
     return {
+        # The twin's time grid may be coarser than the recording's.
         joint: np.interp(recording.time, look.time, values + magnify * (predicted[joint] - values))
         for joint, values in measured.items()
     }
@@ -208,7 +204,7 @@ def load(path: str | Path, machine: Machine | str | Path | None = None) -> Recor
     if not isinstance(path, str | Path):
         raise RigtwinError(f"{path!r:.60}: expected the path of a recording")
     # The machine first: a model or a folder in its place is the likelier mistake.
-    described = _resolve_optional(machine)
+    described = resolve_optional(machine)
     return with_machine(reader.load(Path(path)), described)
 
 
@@ -227,102 +223,6 @@ def with_machine(recording: reader.Recording, machine: Machine | None) -> Record
     return Recording(**values, described=machine)
 
 
-def import_data(
-    data: Data | str | Path | Sequence[str | Path],
-    mapping: str | Path | Mapping[str, Any],
-    out: str | Path,
-    *,
-    machine: Machine | str | Path | None = None,
-) -> Recording:
-    """Convert another program's data to a recording.
-
-    Parameters
-    ----------
-    data
-        File or folder of a kind that docs/importing.md lists; several files, which are put side by
-        side, row by row; or data in memory: a pandas DataFrame, an Arrow table, or a dictionary of
-        name → array, shape (rows,) or (rows, items).
-    mapping
-        Map from columns to channels (docs/importing.md): a TOML file, or its tables as a
-        dictionary.
-    out
-        File of the recording, MCAP.
-    machine
-        Machine the data belong to, or its name or description. Defaults to the one named in the
-        map.
-
-    Returns
-    -------
-    Recording
-        The recording. Its `report` has lines about the data: gaps, repeated times, columns used.
-
-    Raises
-    ------
-    RigtwinError
-        If the data cannot be imported; the message names the column, unit or line. Also for data
-        of several episodes, which `import_episodes` reads.
-
-    Examples
-    --------
-    >>> rigtwin.import_data("bench.csv", "map.toml", "bench.mcap")  # doctest: +SKIP
-    """
-    described = _resolve_optional(machine)
-    report = convert(_as_paths(data), _as_map(mapping), Path(out), described)
-    return replace(load(out, described), report=tuple(report))
-
-
-def import_episodes(
-    data: Data | str | Path | Sequence[str | Path],
-    mapping: str | Path | Mapping[str, Any],
-    folder: str | Path,
-    *,
-    machine: Machine | str | Path | None = None,
-) -> tuple[Recording, ...]:
-    """Convert each episode of another program's data to a recording.
-
-    Parameters
-    ----------
-    data, mapping, machine
-        As for `import_data`.
-    folder
-        Folder of the recordings. It is created if it does not exist.
-
-    Returns
-    -------
-    tuple of Recording
-        Recordings in the order of the episodes. An episode that cannot be imported is omitted, and
-        every report states so.
-
-    Raises
-    ------
-    RigtwinError
-        If no episode can be imported.
-    """
-    described = _resolve_optional(machine)
-    episodes = convert_episodes(_as_paths(data), _as_map(mapping), Path(folder), described)
-    return tuple(
-        replace(load(episode.path, described), report=episode.report) for episode in episodes
-    )
-
-
-def _resolve_optional(machine: Machine | str | Path | None) -> Machine | None:
+def resolve_optional(machine: Machine | str | Path | None) -> Machine | None:
+    """Return the machine that an optional argument names; None stays None."""
     return None if machine is None else resolve_machine(machine)
-
-
-def _as_paths(data: Any) -> Any:
-    """Return paths as a list, and data in memory as they are."""
-    if isinstance(data, str | Path):
-        return [Path(data)]
-    if (
-        isinstance(data, list | tuple)
-        and data
-        and all(isinstance(name, str | Path) for name in data)
-    ):
-        return [Path(name) for name in data]
-    if isinstance(data, bool | int | float) or data is None:
-        raise RigtwinError(f"data {data!r}: expected the path of a file, or a table in memory")
-    return data
-
-
-def _as_map(mapping: str | Path | Mapping[str, Any]) -> Path | Mapping[str, Any]:
-    return mapping if isinstance(mapping, Mapping) else Path(mapping)

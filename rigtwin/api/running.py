@@ -9,8 +9,9 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from rigtwin.api.machines import Effects, Settings, effect_texts, resolve_machine
+from rigtwin.api.machines import resolve_machine
 from rigtwin.api.recordings import Recording, with_machine
+from rigtwin.api.twin import Effects, Settings, effect_texts
 from rigtwin.description.changes import with_changes
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Machine
@@ -94,6 +95,7 @@ def run(
     """
     if not isinstance(seed, int) or seed < 0:
         raise RigtwinError(f"seed {seed!r:.60}: expected a whole number from 0")
+    # Checked before the machine is built, which may take seconds.
     if controller is not None and not callable(getattr(controller, "tick", controller)):
         raise RigtwinError(f"controller {controller!r:.60}: expected a function, or a method tick")
     described = resolve_machine(machine)
@@ -154,5 +156,6 @@ def _resolve_experiment(machine: Machine, experiment: str | Experiment | Demandi
         return experiment
     if not callable(experiment):
         raise RigtwinError(f"experiment {experiment!r:.60}: expected a name, or a function")
+    # An object, or a partial function, has no name of its own.
     name = getattr(experiment, "__name__", "own")
     return Experiment(name, "", "", machine.configuration, experiment)

@@ -1,390 +1,25 @@
-"""Supervised tests on the rig's card, on a virtual card, or on the twin behind a card.
-
-`plan_test` reads a test, `dry_run` rehearses it, `run_on_twin` and `run_on_card` run it, and
-`run_session` runs a list of tests.
-"""
+"""A session: a list of tests that are recorded one after another into a folder."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
-from datetime import date
+from functools import partial
 from pathlib import Path
 
 from machines import DEFAULT_MACHINE
-from rigtwin.api.machines import Effects, Settings, effect_texts, resolve_machine
-from rigtwin.api.recordings import Recording, load
-from rigtwin.description.changes import read_toml, with_changes
-from rigtwin.description.configuration import Configuration
-from rigtwin.description.limits import require_order
+from rigtwin.api.machines import resolve_machine
+from rigtwin.api.planning import check_settings
+from rigtwin.description.changes import read_toml
 from rigtwin.description.machine import Machine
 from rigtwin.errors import RigtwinError
-from rigtwin.files import recordable
-from rigtwin.hardware.daq import CARD
-from rigtwin.hardware.daq.table import load_table
-from rigtwin.hardware.daq.wired import InRealTime, WiredTwin
-from rigtwin.hardware.session.custom_controller import ControllerFactory, custom_controller
-from rigtwin.hardware.session.dry_run import add_dry_run
-from rigtwin.hardware.session.permission import key_of, list_obstacles, require_permission
 from rigtwin.hardware.session.plan import PlannedTest, is_complete, move_aside, parse_plan
-from rigtwin.hardware.session.record import (
-    open_virtual_card,
-    record_in_real_time,
-    record_unpaced,
-)
-from rigtwin.hardware.session.stops import stop_requests
-from rigtwin.hardware.session.test import AnyTest
-from rigtwin.hardware.supervision import SessionEnd
-from rigtwin.hardware.supervisor import COMPLETED
 from rigtwin.recording.owner import open_alone
-from rigtwin.simulation.experiment import Experiment, find_experiment
-from rigtwin.simulation.peaks import Peak
+from rigtwin.simulation.experiment import find_experiment
 
-PORTS = 65535
 LOCK = "session.lock"
 """Lock file in a session's folder: only one session at a time writes into a folder."""
-Stop = Callable[[], str | None]
-"""Function called in every tick. A returned text ends the test and is recorded as its reason."""
-
-
-@contextmanager
-def _stopped_by(stop: Stop | None, file: str | Path | None) -> Iterator[Stop]:
-    """Yield the function that may stop a test: `stop`, or the operator's keys, signals and file."""
-    if stop is not None:
-        yield stop
-    else:
-        with stop_requests(None if file is None else Path(file)) as requests:
-            yield requests
-
-
-@dataclass(frozen=True)
-class SessionResult:
-    """Result of a supervised test.
-
-    Attributes
-    ----------
-    path : Path
-        File of the recording.
-    ticks : int
-        Number of recorded ticks.
-    cause : str
-        Reason why the test ended, in words.
-    completed : bool
-        Whether the test reached its planned end.
-    """
-
-    path: Path
-    ticks: int
-    cause: str
-    completed: bool
-
-
-@dataclass(frozen=True)
-class DryRun:
-    """Result of a session on the virtual card.
-
-    Attributes
-    ----------
-    recording : Recording or None
-        Recording of the session; None if it ended before the first tick.
-    cause : str
-        Reason why the session ended, in words.
-    passed : bool
-        True if the session reached its planned end. Only then may the rig be armed for this test.
-    peaks : tuple of Peak
-        Predicted peak of each limited quantity, with its limit and margin.
-    obstacles : tuple of str
-        Further reasons that prevent the test on the rig, one line each.
-    """
-
-    recording: Recording | None
-    cause: str
-    passed: bool
-    peaks: tuple[Peak, ...]
-    obstacles: tuple[str, ...]
-
-
-def plan_test(
-    experiment: str,
-    *,
-    machine: Machine | str | Path = DEFAULT_MACHINE,
-    card: str | Path | None = None,
-    settings: Settings = (),
-    seed: int = 0,
-    effects: Effects = (),
-    controller: ControllerFactory | None = None,
-) -> AnyTest:
-    """Return a test that is ready for supervision.
-
-    Parameters
-    ----------
-    experiment
-        Name of an experiment of the machine.
-    machine
-        Machine, its name, or the path of its description. Machines other than the suspension rig
-        may have force actuators and servos only.
-    card
-        Channel table of the card, TOML. Defaults to the shipped one of the suspension rig; other
-        machines need their own.
-    settings
-        Changes of the configuration, such as {"safety": {"force": 1200}}, or the path of a TOML
-        file, or a sequence of both.
-    seed
-        Seed of the twin's noise and of the road, at least 0.
-    effects
-        Effects added to the twin. They do not apply to the machine itself.
-    controller
-        Function of the test's configuration that returns a custom controller, see `run`. It is
-        called once for each session.
-
-    Returns
-    -------
-    AnyTest
-        The planned test.
-
-    Raises
-    ------
-    RigtwinError
-        For a mistake in any argument, or a controller that the machine cannot run.
-    """
-    if not isinstance(seed, int) or seed < 0:
-        raise RigtwinError(f"seed {seed!r:.60}: expected a whole number from 0")
-    described = resolve_machine(machine)
-    test = find_experiment(described, experiment)
-    configuration = check_settings(described, test.configuration, settings)
-    physics = described.physics
-    path = physics.card if card is None else Path(card)
-    if path is None:
-        raise RigtwinError(
-            f"{described.name}: no channel table; expected the table of the card it is wired to"
-        )
-    return physics.plan(
-        described,
-        test,
-        configuration,
-        seed,
-        load_table(path, physics.signals(described)),
-        tuple(effect_texts(effects)),
-        None if controller is None else custom_controller(controller),
-    )
-
-
-def check_settings(machine: Machine, base: Configuration, changes: Settings) -> Configuration:
-    """Return changed settings. Raises RigtwinError if no test can be run with them."""
-    configuration = with_changes(base, changes)
-    require_order(machine, configuration)
-    # Both properties raise where period and timestep do not divide the duration.
-    _ = configuration.ticks, configuration.substeps
-    return configuration
-
-
-def dry_run(
-    experiment: str,
-    card: str | Path,
-    *,
-    path: str | Path,
-    machine: Machine | str | Path = DEFAULT_MACHINE,
-    settings: Settings = (),
-    seed: int = 0,
-    controller: ControllerFactory | None = None,
-    effects: Effects = (),
-    progress: Callable[[int], object] = lambda _: None,
-    stop: Stop | None = None,
-    stop_file: str | Path | None = None,
-) -> DryRun:
-    """Run the exact session of a test on the virtual card, before the machine is armed for it.
-
-    A session that passes is noted beside the channel table. The machine can then be armed by a
-    person, for exactly this test.
-
-    Parameters
-    ----------
-    experiment, machine, card, settings, seed, controller
-        Test to rehearse, see `plan_test`. With the shipped channel table nothing is noted.
-    effects
-        Effects added to the twin. With any effect nothing is noted.
-    path
-        File of the recording, MCAP.
-    progress
-        Function called with the number of ticks since its last call.
-    stop
-        Function that returns a reason to end the session, or None. By default the session ends at
-        a key, or at a signal such as Ctrl-C's.
-    stop_file
-        File whose appearance ends the session, unless `stop` is given.
-
-    Returns
-    -------
-    DryRun
-        Reason of the end, the recording, and the margin to every limit.
-
-    Raises
-    ------
-    RigtwinError
-        If the test could not be run on the machine either.
-    """
-    test = plan_test(
-        experiment,
-        machine=machine,
-        card=card,
-        settings=settings,
-        seed=seed,
-        effects=effects,
-        controller=controller,
-    )
-    virtual, _ = open_virtual_card(test)
-    with _stopped_by(stop, stop_file) as asked:
-        ended = record_unpaced(virtual, test, Path(path), asked, progress)
-    recording = load(Path(path)) if ended.ticks else None
-    passed = ended.cause == COMPLETED
-    peaks = test.predict_peaks(recording) if recording is not None else ()
-    # The shipped table arms nothing, and its folder may be read-only.
-    shipped = Path(card).resolve().parent == CARD.resolve().parent
-    if passed and not test.effects and not shipped:
-        note = {"experiment": test.experiment, "date": date.today().isoformat()}
-        add_dry_run(Path(card), key_of(test), note)
-    return DryRun(recording, ended.cause.reason, passed, peaks, list_obstacles(test))
-
-
-def run_on_twin(
-    experiment: str,
-    *,
-    path: str | Path,
-    machine: Machine | str | Path = DEFAULT_MACHINE,
-    card: str | Path | None = None,
-    real_time: bool = False,
-    settings: Settings = (),
-    seed: int = 0,
-    controller: ControllerFactory | None = None,
-    effects: Effects = (),
-    live: int = 0,
-    progress: Callable[[int], object] = lambda _: None,
-    stop: Stop | None = None,
-    stop_file: str | Path | None = None,
-) -> SessionResult:
-    """Run a supervised test on the twin, behind the card's converters.
-
-    Parameters
-    ----------
-    experiment, machine, card, settings, seed, controller, effects
-        Test to run, see `plan_test`.
-    path
-        File of the recording, MCAP.
-    real_time
-        Whether the twin keeps pace with the clock. By default it runs as fast as possible.
-    live
-        Port of a live view for Foxglove; 0, the default, opens none.
-    progress
-        Function called with the number of ticks since its last call.
-    stop, stop_file
-        Reasons to end the test, see `dry_run`.
-
-    Returns
-    -------
-    SessionResult
-        Recording, and the reason why the test ended.
-
-    Raises
-    ------
-    RigtwinError
-        For a mistake in any argument, before the test starts.
-    """
-    _require_port(live)
-    test = plan_test(
-        experiment,
-        machine=machine,
-        card=card,
-        settings=settings,
-        seed=seed,
-        effects=effects,
-        controller=controller,
-    )
-    twin = WiredTwin(test.terminals(), test.table)
-    with _stopped_by(stop, stop_file) as asked:
-        if real_time:
-            timed = InRealTime(twin, test.period)
-            ended = record_in_real_time(
-                timed, test, recordable(path), asked, guarded=False, live=live, progress=progress
-            )
-        else:
-            ended = record_unpaced(twin, test, recordable(path), asked, progress)
-    return _result(Path(path), ended)
-
-
-def run_on_card(
-    experiment: str,
-    card: str | Path,
-    *,
-    path: str | Path,
-    arm: Callable[[AnyTest], bool],
-    machine: Machine | str | Path = DEFAULT_MACHINE,
-    without_dry_run: str | None = None,
-    settings: Settings = (),
-    seed: int = 0,
-    controller: ControllerFactory | None = None,
-    live: int = 0,
-    progress: Callable[[int], object] = lambda _: None,
-    stop: Stop | None = None,
-    stop_file: str | Path | None = None,
-) -> SessionResult | None:
-    """Run a test on the machine itself.
-
-    Parameters
-    ----------
-    experiment, machine, settings, seed, controller
-        Test to run, see `plan_test`.
-    card
-        Channel table of the card, calibrated and signed by an operator.
-    path
-        File of the recording, MCAP.
-    arm
-        Function that asks the operator whether everybody is clear of the machine. It is called
-        before anything moves, and nothing moves unless it returns True.
-    without_dry_run
-        Name of the person responsible for a test without a passed dry run. It is recorded.
-    live
-        Port of a live view for Foxglove; 0, the default, opens none.
-    progress
-        Function called with the number of ticks since its last call.
-    stop, stop_file
-        Reasons to end the test, see `dry_run`.
-
-    Returns
-    -------
-    SessionResult or None
-        Recording, and the reason why the test ended. None if the machine was not armed.
-
-    Raises
-    ------
-    RigtwinError
-        If the test is not permitted on this machine, before anything moves.
-    """
-    _require_port(live)
-    test = plan_test(
-        experiment,
-        machine=machine,
-        card=card,
-        settings=settings,
-        seed=seed,
-        controller=controller,
-    )
-    permission = require_permission(test, Path(card), without_dry_run)
-    if not arm(test):
-        return None
-    with _stopped_by(stop, stop_file) as asked:
-        ended = record_in_real_time(
-            permission.card,
-            test,
-            Path(path),
-            asked,
-            guarded=True,
-            notes=permission.notes,
-            live=live,
-            progress=progress,
-        )
-    return _result(Path(path), ended)
 
 
 def run_session(
@@ -433,20 +68,8 @@ def run_session(
         raised before anything moves.
     """
     folder, described = Path(folder), resolve_machine(machine)
-
-    def find_test(name: str) -> Experiment:
-        return find_experiment(described, name)
-
-    def check(test: PlannedTest) -> object:
-        experiment = find_test(test.experiment)
-        configuration = check_settings(described, experiment.configuration, test.changes)
-        return experiment.demands(configuration, test.seed)
-
+    find_test = partial(find_experiment, described)
     tests = read_toml(Path(plan), lambda tables: parse_plan(tables, find_test))
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise RigtwinError(f"cannot make {folder}: {error.strerror}") from None
     with _alone(folder):
         return _run_tests(
             tests=tests,
@@ -454,14 +77,26 @@ def run_session(
             run=run,
             resume=resume,
             real=real,
-            prepare=prepare or check,
+            prepare=prepare or partial(_check_planned, described),
             on_message=on_message,
         )
 
 
+def _check_planned(machine: Machine, test: PlannedTest) -> None:
+    """Raise RigtwinError unless a planned test can be run."""
+    experiment = find_experiment(machine, test.experiment)
+    configuration = check_settings(machine, experiment.configuration, test.changes)
+    # Demands are computed as well, since a mistake in them shows only then.
+    experiment.demands(configuration, test.seed)
+
+
 @contextmanager
 def _alone(folder: Path) -> Iterator[None]:
-    """Lock a folder for this session. Raises RigtwinError if another session has locked it."""
+    """Make and lock a session's folder. Raises RigtwinError if another session has locked it."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise RigtwinError(f"cannot make {folder}: {error.strerror}") from None
     try:
         held = open_alone(folder / LOCK)
     except OSError as error:
@@ -470,6 +105,7 @@ def _alone(folder: Path) -> Iterator[None]:
         raise RigtwinError(
             f"another session is running into {folder}; wait for it, or name another folder"
         ) from None
+    # The lock ends with the file, also if this program is killed.
     with held:
         yield
 
@@ -510,12 +146,3 @@ def _run_tests(
             on_message(f"{test.name} did not complete; see {path}, then resume")
             return False
     return True
-
-
-def _result(path: Path, ended: SessionEnd) -> SessionResult:
-    return SessionResult(path, ended.ticks, ended.cause.reason, ended.cause == COMPLETED)
-
-
-def _require_port(live: int) -> None:
-    if not isinstance(live, int) or not 0 <= live <= PORTS:
-        raise RigtwinError(f"live {live!r:.40}: expected a port, 0 to {PORTS}")

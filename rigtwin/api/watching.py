@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
-from rigtwin.api.machines import Settings, described_machine, twin_of
+from rigtwin.api.machines import described_machine
+from rigtwin.api.twin import Settings, twin_of
 from rigtwin.description.machine import Machine
 from rigtwin.errors import RigtwinError
+from rigtwin.recording import reader
 from rigtwin.recording.growing import GrowingRecording
 from rigtwin.watching import Alarm, Suspect, Watch
 from rigtwin.watching.watch import SHORTEST, STEP, WARM, WINDOW
@@ -43,24 +45,15 @@ def watch(
     ----------
     path
         File of the recording, MCAP, which another program is writing or will write.
-    machine
-        Machine the recording belongs to, or its name, or the path of its description. Defaults to
-        the one named in the recording.
-    settings
-        Changes of the twin before the comparison: of its plant and `timing.timestep`. All other
-        settings are the recording's own.
-    without
-        Effects of the nominal machine that are removed from the twin first, such as
-        "coulomb@rail".
-    on_update
-        Function called with the `Watch` after each judged interval and each search for suspects.
-    suspects
-        Whether to search for effects that may cause an alarm. Defaults to True.
-    step
-        Length of the interval that is judged at a time, in s, 0.5 by default. It grows where the
+    machine, settings, without
+        Machine of the recording, changes of the twin, and effects removed from it, see `diagnose`.
+    on_update, suspects
+        Function called with the `Watch` after each judged interval and each search for suspects,
+        and whether to search for effects that may cause an alarm.
+    step, patience
+        Length of the interval that is judged at a time, 0.5 s by default, and time without new
+        data after which the recording is given up, 30 s by default. The interval grows where the
         comparison takes longer than the test.
-    patience
-        Time without new data after which the recording is given up, in s, 30 by default.
     stop
         Function called between two looks at the file; the watch ends when it returns True.
 
@@ -74,22 +67,51 @@ def watch(
     Raises
     ------
     RigtwinError
-        If the file cannot be read, belongs to another machine, lacks a channel, or is too short to
-        be judged, or if nothing is added for longer than `patience` before the test ends.
+        If the file cannot be read or judged, or nothing is added to it for longer than `patience`.
 
     Examples
     --------
     >>> watch = rigtwin.watch("test.mcap", on_update=lambda now: print(now.level))  # doctest: +SKIP
     >>> print(watch.alarm)  # doctest: +SKIP
     """
+    watching = None
+    for recording, ended in _read_intervals(Path(path), step, patience, stop):
+        watching = watching or _start_watch(recording, machine, settings, without)
+        if watching.take(recording, last=ended):
+            on_update(watching)
+        if suspects and watching.investigate(recording, last=ended):
+            on_update(watching)
+    if watching is None or watching.gap is None:
+        why = watching.note if watching is not None else ""
+        raise RigtwinError(why or f"{path}: a test is judged from {SHORTEST:g} s on")
+    return watching
+
+
+def _start_watch(
+    recording: reader.Recording,
+    machine: Machine | str | Path | None,
+    settings: Settings,
+    without: Sequence[str],
+) -> Watch:
+    """Return a watch of the machine whose first interval was recorded."""
+    described = described_machine(recording, machine)
+    return Watch(described, twin_of(described, settings, without))
+
+
+def _read_intervals(
+    path: Path, step: float, patience: float, stop: Callable[[], bool]
+) -> Iterator[tuple[reader.Recording, bool]]:
+    """Yield the window of a growing recording after each interval, and whether its test ended."""
     if not STEP <= step <= WINDOW - WARM:
         raise RigtwinError(f"step {step:g} s: expected {STEP:g} to {WINDOW - WARM:g} s")
     if not patience > 0.0:
         raise RigtwinError(f"patience {patience:g} s: expected more than 0 s")
-    growing = GrowingRecording(Path(path), WINDOW + step)
-    watching, last_new = None, time.monotonic()
-    while not stop():
+    # Longer by a step, so that the window is complete after each read.
+    growing = GrowingRecording(path, WINDOW + step)
+    last_new = time.monotonic()
+    while not (growing.ended or stop()):
         now = time.monotonic()
+        # The recording may be awaited before its test has begun.
         if not growing.path.exists() and now - last_new <= patience:
             time.sleep(POLL)
             continue
@@ -105,17 +127,4 @@ def watch(
             time.sleep(POLL)
             continue
         last_new = now
-        recording = growing.recording()
-        if watching is None:
-            described = described_machine(recording, machine)
-            watching = Watch(described, twin_of(described, settings, without))
-        if watching.take(recording, last=growing.ended):
-            on_update(watching)
-        if suspects and watching.investigate(recording, last=growing.ended):
-            on_update(watching)
-        if growing.ended:
-            break
-    if watching is None or watching.gap is None:
-        why = watching.note if watching is not None else ""
-        raise RigtwinError(why or f"{path}: a test is judged from {SHORTEST:g} s on")
-    return watching
+        yield growing.recording(), growing.ended

@@ -91,6 +91,7 @@ def execute(parsed: argparse.Namespace) -> int:
 
 
 def _diagnoses(parsed: argparse.Namespace) -> int:
+    # Here and below imported when asked for: help must not load SciPy and MuJoCo.
     from referee.score import document, table
 
     with counting_bar("case", "withheld effects") as progress:
@@ -149,6 +150,7 @@ def _tuning(parsed: argparse.Namespace) -> int:
         expected = "expected a study with one objective that is of the test itself"
         raise RigtwinError(f"--tune {parsed.tune}: {expected}")
     cases = RIGS if parsed.cases is None else parsed.cases
+    # One search for each rig, and one on the nominal twin for comparison.
     searches = (cases + 1) * (budget.evaluations + 1) * budget.roads
     total = searches + cases * (1 + 3 * budget.held_out)
     with (

@@ -28,6 +28,7 @@ def execute(parsed: argparse.Namespace) -> int:
     import rigtwin
 
     recording = rigtwin.load(parsed.recording)
+    # Checked before the work, which would be lost otherwise.
     if parsed.out is not None:
         writable(parsed.out)
     for note in recording.notes:

@@ -7,7 +7,7 @@ import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import rigtwin
 from machines import DEFAULT_MACHINE
@@ -25,6 +25,16 @@ ARM = "the check moves ground, structure and motor a little; everybody clear? ty
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     deeds = parser.add_subparsers(dest="deed", metavar="deed", required=True)
+    _add_serve(deeds)
+    _add_check(deeds)
+    freeing = deeds.add_parser(
+        "release", help="release the lines that a dead program holds on a gRPC device server"
+    )
+    freeing.add_argument("card", type=Path, metavar="CARD.toml")
+    _add_machine(freeing)
+
+
+def _add_serve(deeds: Any) -> None:
     serving = deeds.add_parser(
         "serve", help="serve the twin as a card to NI-DAQmx gRPC clients on this computer"
     )
@@ -41,6 +51,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     serving.add_argument("--seed", type=int, default=0, help="seed of the sensor noise (default 0)")
     add_effect(serving, "give the rig an effect, e.g. coulomb@rail=80")
     add_settings(serving)
+
+
+def _add_check(deeds: Any) -> None:
     checking = deeds.add_parser(
         "check", help="calibrate zero, span and signs; write the channel table"
     )
@@ -57,6 +70,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--operator", required=True, metavar="NAME", help="name of the person who calibrates"
     )
     checking.add_argument("--note", default="", help="remark that is stored in the table")
+    _add_corrections(checking)
+    checking.add_argument(
+        "--arm", action="store_true", help="skip the question: everybody is clear of the rig"
+    )
+    checking.add_argument(
+        "--virtual",
+        type=Path,
+        metavar="WIRING.toml",
+        help="check a virtual card that is wired by this table",
+    )
+
+
+def _add_corrections(checking: argparse.ArgumentParser) -> None:
+    """Add the options that say what is corrected, and by which values."""
     checking.add_argument(
         "--signs",
         action="store_true",
@@ -95,20 +122,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="OUTPUT=+|-",
         help="direction of an output, in place of the question",
     )
-    checking.add_argument(
-        "--arm", action="store_true", help="skip the question: everybody is clear of the rig"
-    )
-    checking.add_argument(
-        "--virtual",
-        type=Path,
-        metavar="WIRING.toml",
-        help="check a virtual card that is wired by this table",
-    )
-    freeing = deeds.add_parser(
-        "release", help="release the lines that a dead program holds on a gRPC device server"
-    )
-    freeing.add_argument("card", type=Path, metavar="CARD.toml")
-    _add_machine(freeing)
 
 
 def _add_machine(parser: argparse.ArgumentParser) -> None:
@@ -203,6 +216,7 @@ def _parse_values(texts: Sequence[str], option: str) -> dict[str, float]:
 def _parse_directions(texts: Sequence[str]) -> dict[str, int]:
     """Return output → direction of each OUTPUT=+ (1) or OUTPUT=- (-1); 0 for any other text."""
     pairs = (text.partition("=") for text in texts)
+    # 0 is no direction; `check_card` refuses it with a message of its own.
     return {name: {"+": 1, "-": -1}.get(sign, 0) for name, _, sign in pairs}
 
 
@@ -215,6 +229,7 @@ def _ask_direction(output: str) -> int:
 
 
 def _ask(question: str, answers: tuple[str, ...]) -> str:
+    # Waiting for an answer that nobody can give would hang a script.
     if not sys.stdin.isatty():
         raise RigtwinError(
             f"no terminal to ask: {question.strip()} (--arm and --moved answer beforehand)"

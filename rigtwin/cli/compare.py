@@ -44,6 +44,7 @@ def execute(parsed: argparse.Namespace) -> int:
                 "--set, --config and --effect change the twin; "
                 "two recordings are compared without one"
             )
+        # Its own machine is not asked for: `compare_recordings` refuses different ones.
         second = rigtwin.load(parsed.other)
         results, differences = rigtwin.compare_recordings(recording, second)
         notes = (*recording.notes, *second.notes, *differences)
@@ -58,6 +59,7 @@ def execute(parsed: argparse.Namespace) -> int:
         ("replay", "residual rms", "noise floor", "ratio", "most of it, Hz")
     ]
     for name, result in results.items():
+        # Parts of a replay are indented below it.
         rows.append(_row(name, result))
         rows += [_row(f"  {output}", part) for output, part in result.outputs.items()]
     print(table(rows))

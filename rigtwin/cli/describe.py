@@ -44,6 +44,7 @@ def execute(parsed: argparse.Namespace) -> int:
     if parsed.out is None:
         print(described)
         return 0
+    # Written before anything is printed, so that the printed commands work at once.
     description, mapping = described.write(parsed.out)
     print(described)
     logs = " ".join(map(str, parsed.log))

@@ -5,20 +5,24 @@ from __future__ import annotations
 import argparse
 import sys
 import time
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rigtwin.cli.options import (
     add_columns,
+    add_held_out,
     add_json,
     add_machine,
     add_settings,
+    add_without,
     add_workers,
     counting_bar,
     read_recordings,
     settings_of,
 )
 from rigtwin.console import writable, write_json
+from rigtwin.errors import RigtwinError
 
 if TYPE_CHECKING:
     import rigtwin
@@ -58,29 +62,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
             metavar=f"F.{kind}",
             help=f"the same report as {kind.upper()}, printed by Chrome, Chromium or Edge",
         )
-    parser.add_argument(
-        "--without",
-        action="append",
-        default=[],
-        metavar="EFFECT",
-        help="take this out of the twin first, e.g. coulomb@rail",
-    )
-    parser.add_argument(
-        "--exclude",
-        action="append",
-        default=[],
-        metavar="EFFECT",
-        help="do not look for this, e.g. delay@motor, or delay at every component",
-    )
-    parser.add_argument(
-        "--held-out",
-        action="extend",
-        nargs="+",
-        type=Path,
-        default=[],
-        metavar="recording",
-        help="recordings of the same machine to judge on",
-    )
+    _add_scope(parser)
     parser.add_argument(
         "--save-twin", type=Path, metavar="F.toml", help="write the corrected twin, for --config"
     )
@@ -108,18 +90,65 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_settings(parser)
 
 
+def _add_scope(parser: argparse.ArgumentParser) -> None:
+    """Add the options that say what is searched for, and what is judged on."""
+    add_without(parser)
+    parser.add_argument(
+        "--exclude",
+        action="append",
+        default=[],
+        metavar="EFFECT",
+        help="do not look for this, e.g. delay@motor, or delay at every component",
+    )
+    add_held_out(parser)
+
+
 def execute(parsed: argparse.Namespace) -> int:
     from tqdm import tqdm
 
     import rigtwin
-    from rigtwin.errors import RigtwinError
-    from rigtwin.render.browser import find_browser
 
     if parsed.each is not None:
         return _diagnose_each(parsed)
+    # They would silently do nothing otherwise.
     if parsed.workers is not None or parsed.cluster is not None:
         raise RigtwinError("--workers and --cluster: of --each; one diagnosis uses all cores")
     begun = time.perf_counter()
+    reports = _check_outputs(parsed)
+    recordings, held_out = read_recordings(parsed)
+    with tqdm(disable=None, unit=" fits", desc="diagnosing", leave=False) as bar:
+
+        def progress(stage: str, steps: int) -> None:
+            bar.set_description(stage, refresh=False)
+            bar.update(steps)
+
+        def show(look: rigtwin.FirstLook) -> None:
+            seconds = time.perf_counter() - begun
+            bar.write(f"first look, {seconds:.1f} s: {look}", file=sys.stderr)
+
+        options: dict[str, Any] = {
+            "settings": settings_of(parsed),
+            "without": parsed.without,
+            "exclude": parsed.exclude,
+            "progress": progress,
+        }
+        if parsed.changed:
+            changes = rigtwin.what_changed(recordings, **options)
+            if parsed.json is not None:
+                write_json(parsed.json, changes.document())
+            # The bar is removed before the answer is printed in its place.
+            bar.close()
+            print(changes)
+            return 0
+        diagnosis = rigtwin.diagnose(recordings, held_out=held_out, first_look=show, **options)
+    print("\n".join(_write_files(parsed, diagnosis, reports)))
+    return 1 if diagnosis.verdict == "unusable" else 0
+
+
+def _check_outputs(parsed: argparse.Namespace) -> list[Path]:
+    """Return the paths of the reports. Raise RigtwinError for outputs that cannot be written."""
+    from rigtwin.render.browser import find_browser
+
     reports = [each for each in (parsed.html, parsed.pdf, parsed.png) if each is not None]
     outputs = (parsed.json, parsed.save_twin, parsed.save_mjcf, *reports)
     if parsed.changed and (parsed.held_out or any(outputs[1:])):
@@ -135,40 +164,15 @@ def execute(parsed: argparse.Namespace) -> int:
         if out is not None:
             if out.suffix.lower() != ending:
                 raise RigtwinError(f"--{name} {out}: expected a name that ends in {ending}")
+            # A missing browser is said now, not after minutes of fits.
             find_browser()
-    recordings, held_out = read_recordings(parsed)
-    with tqdm(disable=None, unit=" fits", desc="diagnosing", leave=False) as bar:
+    return reports
 
-        def progress(stage: str, steps: int) -> None:
-            bar.set_description(stage, refresh=False)
-            bar.update(steps)
 
-        def show(look: rigtwin.FirstLook) -> None:
-            seconds = time.perf_counter() - begun
-            bar.write(f"first look, {seconds:.1f} s: {look}", file=sys.stderr)
-
-        if parsed.changed:
-            changes = rigtwin.what_changed(
-                recordings,
-                settings=settings_of(parsed),
-                without=parsed.without,
-                exclude=parsed.exclude,
-                progress=progress,
-            )
-            if parsed.json is not None:
-                write_json(parsed.json, changes.document())
-            bar.close()
-            print(changes)
-            return 0
-        diagnosis = rigtwin.diagnose(
-            recordings,
-            held_out=held_out,
-            settings=settings_of(parsed),
-            without=parsed.without,
-            exclude=parsed.exclude,
-            progress=progress,
-            first_look=show,
-        )
+def _write_files(
+    parsed: argparse.Namespace, diagnosis: rigtwin.Diagnosis, reports: Sequence[Path]
+) -> list[str]:
+    """Write the files that were asked for; return the lines to print."""
     # Files first: whoever reads the terminal may stop reading.
     said = [str(diagnosis)]
     if parsed.json is not None:
@@ -185,15 +189,13 @@ def execute(parsed: argparse.Namespace) -> int:
         said += [f"  not in it, as MJCF has no attribute for it: {each}" for each in omitted]
     elif parsed.save_mjcf is not None:
         said.append(f"{parsed.save_mjcf} not written: there is nothing to correct")
-    print("\n".join(said))
-    return 1 if diagnosis.verdict == "unusable" else 0
+    return said
 
 
 def _diagnose_each(parsed: argparse.Namespace) -> int:
     """1 if one of them has no answer, else 0."""
     import rigtwin
     from rigtwin.api.each import TABLE
-    from rigtwin.errors import RigtwinError
 
     alone = (parsed.json, parsed.html, parsed.pdf, parsed.png, parsed.save_twin, parsed.save_mjcf)
     if parsed.exclude:

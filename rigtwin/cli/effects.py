@@ -35,6 +35,7 @@ def execute(parsed: argparse.Namespace) -> int:
             unit = machine.unit(effect.group, quantity)
             allowed = f"{quantity.low:g} to {quantity.high:g}"
             rows.append((name, parameter, value, unit, allowed, meaning))
+            # Further parameters of one effect repeat neither its name nor its meaning.
             name = meaning = ""
     if len(rows) == 1:
         known = ", ".join(dict.fromkeys(effect.component for effect in effects))

@@ -16,8 +16,8 @@ from rigtwin.files import atomic_write
 from rigtwin.hardware.daq import CARD
 
 if TYPE_CHECKING:
-    from rigtwin.hardware.faults.campaign import FaultResult
     from rigtwin.hardware.faults.kinds import FaultKind
+    from rigtwin.hardware.faults.outcome import FaultResult
 
 SUMMARY = "put faults into sessions on the virtual card; see that each is stopped"
 MORE = "docs/faults.md"
@@ -125,6 +125,7 @@ def execute(parsed: argparse.Namespace) -> int:
         _write(parsed.out, said, _page_rows(tried), list(campaign.failed))
     if parsed.json is not None:
         write_json(parsed.json, [asdict(result) for result in campaign.results])
+    # A session that was not run proves nothing, so it counts as one that failed.
     return 0 if not campaign.failed and not campaign.undone else 4
 
 
@@ -171,10 +172,9 @@ def _page_rows(tried: Mapping[FaultKind, list[FaultResult]]) -> list[tuple[str, 
 def _describe(result: FaultResult) -> str:
     fault = result.fault
     return (
-        f"{fault.kind.name} at tick {fault.at} of {fault.experiment}, place {fault.place}, "
-        f"seed {fault.seed}: safe "
-        f"{result.late} ticks late, {100 * result.exceeded:.0f} % of a limit, said {result.cause}: "
-        f"{result.reason}"
+        f"{fault.kind.name} at tick {fault.at} of {fault.experiment}, place {fault.place}, seed "
+        f"{fault.seed}: safe {result.late} ticks late, {100 * result.exceeded:.0f} % of a limit, "
+        f"said {result.cause}: {result.reason}"
     )
 
 
@@ -192,6 +192,7 @@ def _write(
         old = path.read_text(encoding="utf-8") if path.is_file() else ""
     except (OSError, UnicodeDecodeError):
         raise RigtwinError(f"cannot read {path}, whose table is to be replaced") from None
+    # A page may hold text before the mark, which is kept; what follows is replaced.
     before, mark, _ = old.partition(MARK)
     table_only = "\n".join(lines) + "\n"
     atomic_write(path, f"{before}{MARK}\n\n{table_only.rstrip()}\n" if mark else table_only)

@@ -20,6 +20,8 @@ def check_files(parsed: argparse.Namespace) -> None:
     outputs = {name: path for name in OUTPUTS if isinstance(path := arguments.get(name), Path)}
     read = [value for name, value in arguments.items() if name not in outputs]
     inputs = [path for value in read for path in _files(value)]
+    # Only an output that exists can overwrite a machine's file; finding those files takes a
+    # second.
     if any(path.exists() for path in outputs.values()):
         inputs += _machine_files(arguments.get("machine"))
     seen: dict[Path, str] = {}

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from rigtwin.cli.options import (
     add_columns,
+    add_held_out,
     add_json,
     add_machine,
     add_settings,
@@ -42,15 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="EFFECT",
         help="effect to fit, such as coulomb@elbow; once for each",
     )
-    parser.add_argument(
-        "--held-out",
-        action="extend",
-        nargs="+",
-        type=Path,
-        default=[],
-        metavar="recording",
-        help="recordings of the same machine to judge on",
-    )
+    add_held_out(parser)
     parser.add_argument(
         "--save-mjcf",
         type=Path,
@@ -68,6 +61,7 @@ def execute(parsed: argparse.Namespace) -> int:
 
     import rigtwin
 
+    # Before the fit, which takes longer than a mistake is worth.
     for out in (parsed.json, parsed.save_mjcf):
         if out is not None:
             writable(out)

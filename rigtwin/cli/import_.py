@@ -48,6 +48,7 @@ def execute(parsed: argparse.Namespace) -> int:
     import rigtwin
 
     out = Path(parsed.out)
+    # A Path drops the trailing slash, so the text as given is asked.
     if out.is_dir() or parsed.out.endswith(("/", "\\")):
         recordings = rigtwin.import_episodes(parsed.data, parsed.map, out, machine=parsed.machine)
         # Every report begins with what the data hold.

@@ -58,12 +58,14 @@ def execute(parsed: argparse.Namespace) -> int:
     if recording.lateness:
         print(late(recording.lateness))
     if recording.machine in rigtwin.machines():
+        # The energy error is an addition, whose absence must not hide the rest.
         with contextlib.suppress(rigtwin.RigtwinError):
             if (energy := rigtwin.energy_error(recording)) is not None:
                 print(f"energy error: {energy}")
     rows: list[tuple[str, ...]] = [("channel", "unit", "lowest", "mean", "highest", "meaning")]
     for channel in channels_of(recording.columns, recording.machine, units):
         values = recording.column(channel.topic, channel.name)
+        # Huge values of foreign recordings overflow in the mean, which then shows as inf.
         with np.errstate(over="ignore", invalid="ignore"):
             figures = (f"{values.min():.5g}", f"{values.mean():.5g}", f"{values.max():.5g}")
         rows.append((f"{channel.topic}.{channel.name}", channel.unit, *figures, channel.meaning))

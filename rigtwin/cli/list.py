@@ -40,6 +40,7 @@ def execute(parsed: argparse.Namespace) -> int:
             allowed = f"{meaning.low:g} to {meaning.high:g}"
             rows.append((key, f"{value:g}", meaning.unit, allowed, meaning.source))
         else:
+            # Choices have labels in place of a range.
             rows.append((key, value.label, "", " | ".join(meaning.labels()), ""))
     print(table(rows))
     return 0

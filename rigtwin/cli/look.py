@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rigtwin.cli.options import add_machine, add_settings, settings_of
+from rigtwin.cli.options import add_machine, add_settings, add_without, settings_of
 from rigtwin.console import writable
 from rigtwin.errors import RigtwinError
 from rigtwin.files import forbid_overwriting
@@ -44,13 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="F.toml",
         help="file that the save button writes (default: RECORDING_twin.toml in this folder)",
     )
-    parser.add_argument(
-        "--without",
-        action="append",
-        default=[],
-        metavar="EFFECT",
-        help="take this out of the twin first, e.g. coulomb@rail",
-    )
+    add_without(parser)
     parser.add_argument("--port", type=int, default=8080, help="default 8080; 0 takes a free one")
     add_machine(parser)
     add_settings(parser)
@@ -60,6 +54,7 @@ def execute(parsed: argparse.Namespace) -> int:
 
     if parsed.live and parsed.diagnosis is not None:
         raise RigtwinError("--diagnosis is of a recording that is whole; not with --live")
+    # The name is settled here, so that the page and the check below mean the same file.
     out = parsed.save_twin or Path(f"{parsed.recording.stem}_twin.toml")
     writable(
         forbid_overwriting(

@@ -63,6 +63,7 @@ def execute(parsed: argparse.Namespace) -> int:
     ]
     effects = [effect for effect in machine.effects() if effect.searched]
     for name, component in machine.components.items():
+        # Tolerances in ticks have no unit of their own to print beside a value.
         held = [t for t in machine.tolerances if t.group == name and not t.ticks]
         part = getattr(machine.plant, name)
         values = ", ".join(
@@ -80,7 +81,9 @@ def execute(parsed: argparse.Namespace) -> int:
         print(f"controller: {machine.control.text}")
     for line in machine.overlooked:
         print(f"not taken into account: {line}")
+    # Flushed: what follows takes up to 20 s.
     print("no mistakes", flush=True)
+    # Last, because it takes longest and everything else is known without it.
     _print_never(machine, math.inf if parsed.identifiability else ALLOWED)
     return 0
 
@@ -120,6 +123,7 @@ def _telling() -> Iterator[Callable[[str], None]]:
         now = time.monotonic()
         said = f"working out what its sensors can show, {now - begun:.0f} s: {stage}"
         if terminal:
+            # Padded to a fixed width, so that a shorter line leaves nothing of a longer one.
             print(f"\r{said[:WIDTH].ljust(WIDTH)}", end="", file=sys.stderr, flush=True)
         elif now - last >= REPORTED:
             print(said, file=sys.stderr, flush=True)

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rigtwin.console import assigned_settings
+from rigtwin.errors import RigtwinError
 
 if TYPE_CHECKING:
     import rigtwin
@@ -43,9 +44,7 @@ def add_effect(parser: argparse.ArgumentParser, summary: str) -> None:
 
 
 def add_machine(
-    parser: argparse.ArgumentParser,
-    what: str = "the machine",
-    default: str | None = None,
+    parser: argparse.ArgumentParser, what: str = "the machine", default: str | None = None
 ) -> None:
     parser.add_argument(
         "--machine",
@@ -53,6 +52,28 @@ def add_machine(
         metavar="F.toml",
         help=f"{what}, by name or description "
         f"(default: {default or 'the one that the recording names'})",
+    )
+
+
+def add_without(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--without",
+        action="append",
+        default=[],
+        metavar="EFFECT",
+        help="take this out of the twin first, e.g. coulomb@rail",
+    )
+
+
+def add_held_out(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--held-out",
+        action="extend",
+        nargs="+",
+        type=Path,
+        default=[],
+        metavar="recording",
+        help="recordings of the same machine to judge on",
     )
 
 
@@ -76,8 +97,6 @@ def add_columns(parser: argparse.ArgumentParser) -> None:
 
 def columns_of(parsed: argparse.Namespace) -> dict[str, str]:
     """Return the statements of --column. Raise RigtwinError for a text without a source."""
-    from rigtwin.errors import RigtwinError
-
     stated: dict[str, str] = {}
     for text in parsed.column:
         key, equals, source = text.partition("=")
@@ -93,7 +112,6 @@ def read_recordings(
     """Return the recordings to explain and those held out; logs of a model are described first."""
     import rigtwin
     from rigtwin.api.describing import needs_description, record_log
-    from rigtwin.errors import RigtwinError
 
     stated = columns_of(parsed)
     paths, held_out = parsed.recordings, parsed.held_out
@@ -115,9 +133,7 @@ def add_workers(parser: argparse.ArgumentParser) -> None:
         help="processes that work side by side (default: one a core)",
     )
     parser.add_argument(
-        "--cluster",
-        metavar="ADDRESS",
-        help="work on a dask cluster instead, e.g. tcp://host:8786",
+        "--cluster", metavar="ADDRESS", help="work on a dask cluster instead, e.g. tcp://host:8786"
     )
 
 
@@ -147,6 +163,7 @@ def counting_bar(unit: str, title: str) -> Iterator[Callable[[int, int], None]]:
     with tqdm(disable=None, desc=title, unit=unit, leave=False, file=sys.stderr) as bar:
 
         def show(done: int, total: int) -> None:
+            # The total is known only once jobs are counted.
             bar.total = total
             bar.update(done - bar.n)
 

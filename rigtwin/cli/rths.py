@@ -77,6 +77,7 @@ def execute(parsed: argparse.Namespace) -> int:
     ]
     for number, test in enumerate(tests):
         if not test.stable:
+            # A test that diverged has no figures worth printing.
             rows.append((_named(number), *[""] * 12, "unstable"))
             continue
         figures = [

@@ -62,10 +62,13 @@ def execute(parsed: argparse.Namespace) -> int:
 
     machine = rigtwin.machine(parsed.machine)
     experiment = find_experiment(machine, parsed.name)
+    # Without a name no recording is overwritten; a stated name may be.
     path = parsed.out or _fresh(f"{experiment.name}-{parsed.seed}")
     if parsed.seed < 0:
         raise RigtwinError(f"--seed {parsed.seed}: expected 0 or more")
     if parsed.target == "daq" or parsed.card is not None or parsed.real_time:
+        # A supervised session runs the twin behind converters, which has its effects from the
+        # start.
         if parsed.effects_from:
             raise RigtwinError("--effects-from does not go with --target, --card and --real-time")
         return _run_supervised(parsed, machine, path)

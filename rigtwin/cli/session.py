@@ -61,6 +61,7 @@ def execute(parsed: argparse.Namespace) -> int:
 
     def prepare(test: PlannedTest) -> None:
         ready = plan(_command_line(parsed, test), test.experiment)
+        # Built only for its checks: a mistake must show before the first test moves anything.
         ready.operation()
         if real:
             require_permission(ready, parsed.card, parsed.without_dry_run)
@@ -93,7 +94,7 @@ def _needs_card(parsed: argparse.Namespace) -> bool:
 
 def _run_on_twin(parsed: argparse.Namespace, machine: Machine) -> int:
     """Runs the list on the twin of any machine."""
-    from rigtwin.api.session import check_settings
+    from rigtwin.api.planning import check_settings
     from rigtwin.simulation.experiment import find_experiment
 
     code = 0
@@ -132,6 +133,7 @@ def _run_on_twin(parsed: argparse.Namespace, machine: Machine) -> int:
 
 def _command_line(parsed: argparse.Namespace, test: PlannedTest) -> argparse.Namespace:
     """The command line of one test: its own settings after those of the session."""
+    # Later settings win, so those of the test come last.
     settings = [*parsed.set, *test.settings]
     return argparse.Namespace(**{**vars(parsed), "seed": test.seed, "set": settings})
 
@@ -140,6 +142,7 @@ def _compare(path: Path, machine: str | None = None) -> None:
     """Says where the rig and the twin disagree, at once."""
     from rigtwin.cli.compare import execute as compare
 
+    # The options that `rigtwin compare` would have parsed.
     defaults = {"other": None, "json": None, "machine": machine, "config": None}
     try:
         compare(argparse.Namespace(recording=path, effect=[], set=[], **defaults))

@@ -59,9 +59,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="draw stability over two parameters, e.g. sprung_mass tau",
     )
     parser.add_argument(
-        "--model",
-        metavar="NAME",
-        help=f"of the map: one of those in the table (default {DRAWN})",
+        "--model", metavar="NAME", help=f"of the map: one of those in the table (default {DRAWN})"
     )
     parser.add_argument(
         "--out",
@@ -77,43 +75,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(parsed: argparse.Namespace) -> int:
     """Prints the poles and the critical lag and delay of every model of a vehicle."""
-    from rigtwin.studies.stability.mapping import (
-        POINTS,
-        SPARSE,
-        around,
-        check_image_format,
-        check_model,
-        draw,
-        stability_map,
-    )
+    from rigtwin.studies.stability.mapping import POINTS, SPARSE, around, draw, stability_map
     from rigtwin.studies.stability.tested import AS_RUN
 
     stability = rigtwin.stability(
         parsed.vehicle, changes=_numbers(parsed.set), tau=parsed.tau, delay=parsed.delay
     )
     car, tau = stability.vehicle, stability.tau
-    out = parsed.out or Path("stability.png")
-    if parsed.out is not None and parsed.map is None:
-        raise RigtwinError(f"-o {parsed.out}: expected --map X Y, the parameters to draw it over")
-    if parsed.model is not None and parsed.map is None:
-        raise RigtwinError(f"--model {parsed.model}: expected --map X Y, which it is drawn over")
-    model = parsed.model or DRAWN
-    for path in filter(None, (out if parsed.map else None, parsed.json)):
-        writable(path)
-    if parsed.map:
-        check_image_format(out)
-        check_model(model)
-        if parsed.delay:
-            raise RigtwinError("--delay with --map: a map is of lags; leave one of them out")
-        if parsed.map[0] == parsed.map[1]:
-            raise RigtwinError(
-                f"--map {parsed.map[0]} {parsed.map[1]}: expected two different parameters"
-            )
+    out, model = parsed.out or Path("stability.png"), parsed.model or DRAWN
+    _check_outputs(parsed, out, model)
     margin = rigtwin.rig_margin(car, compensator=parsed.compensator)
     points = SPARSE if model in AS_RUN else POINTS
+    # Axes are built before anything is printed, as they may refuse a name.
     axes = [around(name, car, tau, points) for name in parsed.map or ()]
     print(", ".join(f"{name.replace('_', ' ')} {value:g}" for name, value in car._asdict().items()))
     print(_printed(stability))
+    # The published rig is shown beside whatever lag was asked for.
     at_rig = rigtwin.stability(car, tau=RIG_LAG).models["rig"]
     words = "stable" if at_rig.stable else "unstable"
     print(
@@ -136,6 +113,27 @@ def execute(parsed: argparse.Namespace) -> int:
             },
         )
     return 0
+
+
+def _check_outputs(parsed: argparse.Namespace, out: Path, model: str) -> None:
+    """Raise RigtwinError for a map that cannot be drawn, or options that require one."""
+    from rigtwin.studies.stability.mapping import check_image_format, check_model
+
+    if parsed.out is not None and parsed.map is None:
+        raise RigtwinError(f"-o {parsed.out}: expected --map X Y, the parameters to draw it over")
+    if parsed.model is not None and parsed.map is None:
+        raise RigtwinError(f"--model {parsed.model}: expected --map X Y, which it is drawn over")
+    for path in filter(None, (out if parsed.map else None, parsed.json)):
+        writable(path)
+    if parsed.map:
+        check_image_format(out)
+        check_model(model)
+        if parsed.delay:
+            raise RigtwinError("--delay with --map: a map is of lags; leave one of them out")
+        if parsed.map[0] == parsed.map[1]:
+            raise RigtwinError(
+                f"--map {parsed.map[0]} {parsed.map[1]}: expected two different parameters"
+            )
 
 
 def _numbers(assignments: list[str]) -> dict[str, float]:

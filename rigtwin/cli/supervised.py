@@ -108,6 +108,7 @@ def run(parsed: argparse.Namespace, name: str, path: Path) -> int:
             rehearsed = rigtwin.dry_run(name, parsed.card, effects=parsed.effect, **options)
             bar.close()
             return _tell_dry_run(parsed, test, path, rehearsed)
+        # A dry run is over in seconds and has no live view.
         options["live"] = parsed.live
         if parsed.target == "daq":
             if parsed.effect:
@@ -172,6 +173,7 @@ def _ask_to_arm(test: AnyTest) -> bool:
     try:
         return input("type arm to go: ").strip() == "arm"
     except EOFError:
+        # The end of the input is no consent.
         return False
 
 

@@ -103,6 +103,7 @@ def execute(parsed: argparse.Namespace) -> int:
             cluster=parsed.cluster,
             progress=progress,
         )
+    # The same rule as in the call, which does not return the folder.
     folder = parsed.out or default_folder(result.study)
     print(text(result))
     print(f"\nlook at {folder / PAGE}\n{command(result.study, folder / SETTINGS)}")

@@ -48,6 +48,7 @@ def execute(parsed: argparse.Namespace) -> int:
 
     import rigtwin
 
+    # Changes of a twin that nobody sees would be a mistake left unsaid.
     if not parsed.ghost and (parsed.set or parsed.config):
         raise RigtwinError("--set and --config are of the twin that --ghost draws; add --ghost")
     recording = rigtwin.load(parsed.recording, parsed.machine)

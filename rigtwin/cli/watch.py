@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from rigtwin.cli.options import add_machine, add_settings, settings_of
+from rigtwin.cli.options import add_machine, add_settings, add_without, settings_of
 
 SUMMARY = "hold a test against its twin while it runs, and raise an alarm at a gap"
 MORE = """\
@@ -22,13 +22,7 @@ exit code 4: an alarm was raised."""
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("recording", type=Path)
-    parser.add_argument(
-        "--without",
-        action="append",
-        default=[],
-        metavar="EFFECT",
-        help="take this out of the twin first, e.g. coulomb@rail",
-    )
+    add_without(parser)
     parser.add_argument(
         "--patience",
         type=float,
@@ -52,6 +46,7 @@ def execute(parsed: argparse.Namespace) -> int:
         def tell(now: rigtwin.Watch) -> None:
             bar.n = now.judged
             bar.set_postfix_str(f"alarm level {100.0 * min(now.level, 1.0):.0f} %")
+            # The alarm's text changes as suspects are found; each version is said once.
             if now.alarm is not None and str(now.alarm) not in said:
                 said.append(str(now.alarm))
                 bar.write(said[-1])

@@ -21,7 +21,8 @@ from rigtwin.errors import RigtwinError
 from rigtwin.files import atomic_write, forbid_overwriting
 from rigtwin.importing.columns import Columns
 from rigtwin.importing.convert import read_channels, read_columns
-from rigtwin.importing.mapping import Map, parse
+from rigtwin.importing.map_file import parse
+from rigtwin.importing.mapping import Map
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
 

@@ -102,6 +102,8 @@ class GenericClientServer:
             raise RigtwinError(f"a client with {wanted}: expected one in 2 to {MOST}")
         while True:
             message = np.frombuffer(_receive(connection, 8 * length), np.float64)
+            # int() raises an error for NaN and infinity; 0 is no request, and is refused like one
+            # below.
             asked = int(message[0]) if np.isfinite(message[0]) else 0
             reply = np.zeros(length)
             if asked == TRIAL:

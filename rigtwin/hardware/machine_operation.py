@@ -125,6 +125,7 @@ class MachineOperation:
         commands: tuple[float, ...],
         interval: float,  # noqa: ARG002
     ) -> Cause | None:
+        # Outputs come first. Demands behind them are only recorded, and have no limits.
         for (signal, low, high), value in zip(self._bounds, commands, strict=False):
             if not math.isfinite(value):
                 return Cause("not_a_number", f"trip: {signal.name} is not a finite number")

@@ -65,6 +65,8 @@ class Pacer:
         if self._next == 0.0:
             self._next = now
         # Deadlines that have passed are skipped, so that ticks stay on the original grid.
+        # A deadline that has just passed is merely late and is used; a whole period later it is
+        # missed.
         behind = int((now - self._next) / self.period) if now > self._next else 0
         self._next += behind * self.period
         if behind == 0:

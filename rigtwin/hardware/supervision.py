@@ -178,6 +178,7 @@ class _Session:
         finally:
             # Also reached if coming to rest itself failed: the card's own stop is the last means.
             rig.stop()
+            # A recording must end in a final state, even if the way there raised an error.
             if self._supervisor.phase == Phase.STOPPING:
                 self._supervisor.go(
                     Phase.FAULTED, Cause("rig", "cut short while it was coming to rest"), self._time

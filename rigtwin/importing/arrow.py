@@ -70,6 +70,7 @@ def _expand(
     from pyarrow import types
 
     kind = column.type
+    # Dictionary and extension types only wrap another type, which is expanded in their place.
     if types.is_dictionary(kind):
         _expand(name, column.cast(kind.value_type), labels, expansion)
     elif isinstance(kind, pyarrow.BaseExtensionType):
@@ -99,6 +100,7 @@ def _field_of(column: Any, place: int) -> Any:
     """Return one field of a column of structures; null where the structure is."""
     import pyarrow
 
+    # `flatten` rather than `field`: it also applies the nulls of the structure to its fields.
     chunks = [chunk.flatten()[place] for chunk in column.chunks]
     return pyarrow.chunked_array(chunks, column.type.field(place).type)
 
@@ -124,6 +126,7 @@ def _integers(column: Any, bits: int) -> Array:
     """Return the integers beneath times, in the column's own unit, so that none overflows."""
     import pyarrow
 
+    # Times are cast to plain integers first: Arrow refuses to cast them to floats directly.
     return _floats(column.cast(pyarrow.int64() if bits == 64 else pyarrow.int32()))
 
 
@@ -137,6 +140,7 @@ def _floats(column: Any) -> Array:
             column = column.cast(pyarrow.int8())
         column = column.cast(pyarrow.float64(), safe=False)
     numbers = np.array(column.to_numpy(), float)
+    # Infinity marks a missing value in some programs, and no sensor measures it.
     numbers[np.isinf(numbers)] = np.nan
     return numbers
 

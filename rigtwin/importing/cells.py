@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 from array import array
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -60,6 +60,7 @@ class ColumnBuilder:
     def end_block(self) -> None:
         """Turn the gathered cells into numbers, if they are plain numbers."""
         block: Array | list[str] = self.cells
+        # NumPy reads "1_000" as 1000, as Python does; a logger does not mean that.
         if self.decimal == "." and not any("_" in cell for cell in self.cells):
             try:
                 block = np.array(self.cells, float)
@@ -79,6 +80,7 @@ class ColumnBuilder:
             return Numbers(np.concatenate(plain))
         cells: list[str] = []
         for block in blocks:
+            # repr gives the shortest text that reads back as the same double.
             cells += block if isinstance(block, list) else map(repr, block.tolist())
         values, row = numbers_of(cells, self.decimal)
         if row is not None:
@@ -111,6 +113,17 @@ class Rows:
     columns: dict[int, ColumnBuilder]
     numbers: array[int] = field(default_factory=lambda: array("q"))
     notes: list[str] = field(default_factory=list)
+
+    def add(self, number: int, cells: Sequence[str]) -> None:
+        """Add the row of a line."""
+        self.numbers.append(number)
+        for place, builder in self.columns.items():
+            # Missing cells become empty ones, which are read as NaN, so that all columns keep one
+            # length.
+            builder.cells.append(cells[place].strip() if place < len(cells) else "")
+        if len(self.numbers) % BLOCK == 0:
+            for builder in self.columns.values():
+                builder.end_block()
 
 
 def gather_rows(
@@ -149,50 +162,51 @@ def gather_rows(
         If a row has numbers beyond its last column.
     """
     rows = Rows({place: ColumnBuilder(decimal) for place in places})
-    builders = list(rows.columns.items())
     short: list[int] = []
     long: list[int] = []
     # A row is added when the next one comes, as the last one may break off.
     waiting: tuple[int, list[str]] | None = None
-
-    def add(number: int, cells: list[str]) -> None:
-        rows.numbers.append(number)
-        for place, builder in builders:
-            builder.cells.append(cells[place].strip() if place < len(cells) else "")
-        if len(rows.numbers) % BLOCK == 0:
-            for _, builder in builders:
-                builder.end_block()
-
-    blank = separator + " \t"
-    for number, line in lines:
-        cells = raw_cells(line, separator)
-        if not line.strip(blank) or not any(map(str.strip, cells)):
-            continue
-        while len(cells) > wide and not cells[-1].strip():
-            cells.pop()
+    for number, cells in _split_rows(lines, separator, wide):
         if len(cells) > wide:
+            # A number too many shifts all columns; a remark behind the last column harms nothing.
             if any(is_value(cell.strip(), decimal) for cell in cells[wide:]):
                 raise RigtwinError(f"{path}: line {number} has {len(cells)} cells; expected {wide}")
             long.append(number)
         elif len(cells) < wide:
             short.append(number)
         if waiting is not None:
-            add(*waiting)
+            rows.add(*waiting)
         waiting = number, cells
     if waiting is not None:
         if short and short[-1] == waiting[0]:
             rows.notes.append(f"the last line, {short.pop()}, breaks off and is left out")
         else:
-            add(*waiting)
-    if short:
-        rows.notes.append(
-            f"{len(short)} lines break off, the first is {short[0]}; cells are missing"
-        )
-    if long:
-        rows.notes.append(
-            f"{len(long)} lines have words after their last cell, the first is {long[0]}"
-        )
+            rows.add(*waiting)
+    rows.notes += _note_lengths(short, long)
     return rows
+
+
+def _note_lengths(short: Sequence[int], long: Sequence[int]) -> Iterator[str]:
+    """Yield remarks on the lines with too few and too many cells."""
+    if short:
+        yield f"{len(short)} lines break off, the first is {short[0]}; cells are missing"
+    if long:
+        yield f"{len(long)} lines have words after their last cell, the first is {long[0]}"
+
+
+def _split_rows(
+    lines: Iterable[tuple[int, str]], separator: str, wide: int
+) -> Iterator[tuple[int, list[str]]]:
+    """Yield number and cells of each line that is not blank."""
+    blank = separator + " \t"
+    for number, line in lines:
+        cells = raw_cells(line, separator)
+        if not line.strip(blank) or not any(map(str.strip, cells)):
+            continue
+        # Many programs end each line with a separator, which makes an empty last cell.
+        while len(cells) > wide and not cells[-1].strip():
+            cells.pop()
+        yield number, cells
 
 
 def raw_cells(line: str, separator: str) -> list[str]:
@@ -201,6 +215,7 @@ def raw_cells(line: str, separator: str) -> list[str]:
         return line.split()
     if '"' not in line:
         return line.split(separator) if line else []
+    # The csv module is much slower than split, and only quotes need it.
     try:
         return next(csv.reader(io.StringIO(line), delimiter=separator), [])
     except csv.Error as error:

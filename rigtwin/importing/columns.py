@@ -169,6 +169,7 @@ def join(tables: Mapping[str, Columns]) -> Columns:
     listed: list[str] = []
     for file, table in tables.items():
         for name, column in table.values.items():
+            # A column is known by its bare name too, if only one of the files has it.
             for label in (f"{file}.{name}", *([name] if names.count(name) == 1 else [])):
                 values[label] = column
                 units |= {label: table.units[name]} if name in table.units else {}

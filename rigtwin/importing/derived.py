@@ -81,6 +81,7 @@ def unwrap(counts: Array, wrap: float) -> tuple[Array, int]:
     int
         Number of replaced samples.
     """
+    # Missing samples would break np.unwrap; the count is interpolated across them afterwards.
     rows = np.nonzero(np.isfinite(counts))[0]
     if len(rows) < WIDEST + 2:
         return counts, 0
@@ -88,10 +89,15 @@ def unwrap(counts: Array, wrap: float) -> tuple[Array, int]:
     sound = np.ones(len(known), bool)
     # Interpolated samples stand in runs of at most WIDEST. A run is found by the jump across it.
     for width in range(1, WIDEST + 1):
+        # Row k of `inner` are the samples between k and k + width + 1; `across` is the step
+        # between those two.
         across = known[width + 1 :] - known[: -width - 1]
         inner = np.lib.stride_tricks.sliding_window_view(known[1:-1], width)
         away = np.abs(_nearest(inner - known[: -width - 1, None], wrap))
         between = (
+            # Three signs of an interpolated wrap: its neighbours lie at opposite ends, it lies
+            # far from both ends, and the true step, without the wrap, is small against that
+            # distance.
             (np.abs(across) > 0.5 * wrap)
             & (np.min(away, axis=1) > BETWEEN * wrap)
             & (np.abs(_nearest(across, wrap)) < 0.2 * np.max(away, axis=1))
@@ -99,6 +105,7 @@ def unwrap(counts: Array, wrap: float) -> tuple[Array, int]:
         for place in np.nonzero(between)[0]:
             sound[place + 1 : place + 1 + width] = False
     turned = np.unwrap(known[sound], period=wrap)
+    # Whole turns are removed so that the first sample lies within ± half the range.
     turned -= wrap * np.round(turned[0] / wrap)
     out = counts.copy()
     out[rows] = np.interp(rows, rows[sound], turned)
@@ -134,6 +141,7 @@ def evaluate(formula: Formula, columns: Mapping[str, Array], period: float) -> A
     rows = len(columns[formula.inputs[0]])
     registers: list[Array | float] = [columns[name] for name in formula.inputs]
     count = len(program.operations)
+    # Registers are the inputs, then the constants, then one result for each operation.
     registers += program.registers[len(registers) : len(program.registers) - count].tolist()
     for code, *places, _ in program.operations.tolist():
         operands = [registers[place] for place in places]
@@ -142,6 +150,7 @@ def evaluate(formula: Formula, columns: Mapping[str, Array], period: float) -> A
         else:
             length = float(np.asarray(operands[1]).flat[0])
             registers.append(_remember(code, np.asarray(operands[0], float), length, period))
+    # A result may be a single number, such as the derivative of a constant.
     return np.broadcast_to(np.asarray(registers[-1], float), (rows,)).copy()
 
 
@@ -156,6 +165,7 @@ def _remember(code: int, signal: Array, length: float, period: float) -> Array |
     if code == DERIVATIVE:
         return np.gradient(signal, period)
     if code == INTEGRAL:
+        # Trapezoidal rule, with an integral of 0 at the first sample.
         return np.concatenate([[0.0], np.cumsum(0.5 * period * (signal[1:] + signal[:-1]))])
     if code == LOW_PASS:
         # butter() takes the corner as a share of the Nyquist frequency: 1/(2π·T) / (1/(2·period)).

@@ -56,6 +56,7 @@ def split_episodes(columns: Columns, column: str, take: Sequence[int]) -> Iterat
         If a row has no whole number of an episode, or an episode to take does not exist.
     """
     numbers = columns.values[column]
+    # Numbers of episodes come as floats, like all columns.
     if (odd := ~(np.floor(numbers) == numbers)).any():
         row = int(np.argmax(odd))
         raise RigtwinError(
@@ -71,6 +72,7 @@ def split_episodes(columns: Columns, column: str, take: Sequence[int]) -> Iterat
         )
     # A stable sort keeps the rows of an episode in their order.
     order = np.argsort(numbers, kind="stable")
+    # np.unique sorts, so `known` and the sorted numbers are in the same order.
     bounds = np.searchsorted(numbers[order], np.array(known))
     for number, rows in zip(known, np.split(order, bounds[1:]), strict=True):
         if not take or number in take:
@@ -79,6 +81,7 @@ def split_episodes(columns: Columns, column: str, take: Sequence[int]) -> Iterat
 
 def _take_rows(columns: Columns, rows: NDArray[np.int64]) -> Columns:
     length = columns.rows
+    # A column of another length, such as a table of settings, has no rows of an episode.
     values = {
         name: values[rows] for name, values in columns.values.items() if len(values) == length
     }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 
@@ -55,9 +56,31 @@ def read_plain(
         return None
     try:
         import pyarrow
-        from pyarrow import csv
     except ImportError:
         return None
+    try:
+        with open_bytes(path) as file:
+            for line in head:
+                # The head was split as text. Where bytes split otherwise, such as at a lone
+                # carriage return, Arrow would begin in the wrong line.
+                if file.readline().decode(encoding, "replace").rstrip("\r\n") != line:
+                    return None
+            parts = _read_blocks(file, separator, decimal, wide, [str(place) for place in places])
+    except pyarrow.ArrowException:
+        return None
+    if parts is None:
+        return None
+    # Popped, so that the parts of one column at a time are in memory twice.
+    return {place: np.concatenate(parts.pop(str(place))) for place in places}
+
+
+def _read_blocks(
+    file: BinaryIO, separator: str, decimal: str, wide: int, names: Sequence[str]
+) -> dict[str, list[Array]] | None:
+    """Return the blocks of each needed column; None if anything is no plain number."""
+    import pyarrow
+    from pyarrow import csv
+
     odd = False
 
     def refuse(_: object) -> str:
@@ -65,42 +88,30 @@ def read_plain(
         odd = True
         return "skip"
 
-    names = [str(place) for place in places]
-    try:
-        with open_bytes(path) as file:
-            for line in head:
-                if file.readline().decode(encoding, "replace").rstrip("\r\n") != line:
-                    return None
-            reader = csv.open_csv(
-                file,
-                csv.ReadOptions(
-                    use_threads=False,
-                    block_size=BLOCK,
-                    column_names=[str(place) for place in range(wide)],
-                ),
-                csv.ParseOptions(delimiter=separator, invalid_row_handler=refuse),
-                csv.ConvertOptions(
-                    include_columns=names,
-                    column_types=dict.fromkeys(names, pyarrow.float64()),
-                    null_values=SPELLINGS,
-                    decimal_point=decimal,
-                    check_utf8=False,
-                ),
-            )
-            parts: dict[str, list[Array]] = {name: [] for name in names}
-            for batch in reader:
-                if odd:
-                    return None
-                columns = [batch.column(name).to_numpy(zero_copy_only=False) for name in names]
-                if np.all([np.isnan(column) for column in columns], axis=0).any():
-                    # Maybe a blank line, which only the slower reader tells from missing cells.
-                    return None
-                for name, column in zip(names, columns, strict=True):
-                    # A copy, or the whole block would stay in memory.
-                    parts[name].append(np.where(np.isinf(column), np.nan, column))
-    except pyarrow.ArrowException:
-        return None
-    if odd or not parts[names[0]]:
-        return None
-    # Popped, so that the parts of one column at a time are in memory twice.
-    return {place: np.concatenate(parts.pop(str(place))) for place in places}
+    reader = csv.open_csv(
+        file,
+        csv.ReadOptions(
+            use_threads=False, block_size=BLOCK, column_names=[str(place) for place in range(wide)]
+        ),
+        csv.ParseOptions(delimiter=separator, invalid_row_handler=refuse),
+        csv.ConvertOptions(
+            include_columns=names,
+            column_types=dict.fromkeys(names, pyarrow.float64()),
+            null_values=SPELLINGS,
+            decimal_point=decimal,
+            check_utf8=False,
+        ),
+    )
+    parts: dict[str, list[Array]] = {name: [] for name in names}
+    for batch in reader:
+        if odd:
+            return None
+        columns = [batch.column(name).to_numpy(zero_copy_only=False) for name in names]
+        if np.all([np.isnan(column) for column in columns], axis=0).any():
+            # Maybe a blank line, which only the slower reader tells from missing cells.
+            return None
+        for name, column in zip(names, columns, strict=True):
+            # A copy, or the whole block would stay in memory.
+            parts[name].append(np.where(np.isinf(column), np.nan, column))
+    # The handler may have been called in the last block.
+    return None if odd or not parts[names[0]] else parts

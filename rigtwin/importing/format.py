@@ -14,6 +14,11 @@ def _is_never_a_folder(_: Path) -> bool:
     return False
 
 
+def first_line(error: Exception) -> str:
+    """Return the first line of an error's text, or its type if it has none."""
+    return (str(error).splitlines() or [type(error).__name__])[0]
+
+
 @dataclass(frozen=True)
 class Format:
     """A kind of file.

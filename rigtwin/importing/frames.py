@@ -67,9 +67,11 @@ def _list_columns(data: Any) -> tuple[list[tuple[str, Any]], str]:
         return [(str(name), column) for name, column in data.items()], "arrays"
     if isinstance(data, np.ndarray) and data.dtype.names:
         return [(name, data[name]) for name in data.dtype.names], "array with named fields"
+    # An Arrow table. pandas objects are known by `iloc`, so that neither package is imported.
     if hasattr(data, "to_pandas") and not hasattr(data, "iloc"):
         data = data.to_pandas()
     if hasattr(data, "columns") and hasattr(data, "iloc"):
+        # A named index is data, such as the time; an unnamed one counts rows.
         index = [] if data.index.name is None else [(str(data.index.name), data.index)]
         columns = [(_label(name), data.iloc[:, place]) for place, name in enumerate(data.columns)]
         return index + columns, "table"
@@ -121,7 +123,9 @@ def _unpack(array: Array) -> Array:
             raise ValueError("it holds lists of different lengths; expected one length")
         return np.stack([np.asarray(cell) for cell in cells])
     if any(isinstance(cell, str) for cell in cells):
+        # `cell != cell` holds for NaN, which pandas stores in place of missing texts.
         return np.array(["" if cell is None or cell != cell else str(cell) for cell in cells])
+    # Dates of Python and pandas are read as text, like those of files.
     if any(hasattr(cell, "isoformat") for cell in cells):
         return np.array([str(cell) for cell in cells])
     return np.array([np.nan if cell is None else float(cell) for cell in cells])
@@ -130,10 +134,12 @@ def _unpack(array: Array) -> Array:
 def _seconds(array: Any) -> Array:
     """Return dates since 1970 or durations in s, not a number where there is none."""
     unit, count = np.datetime_data(array.dtype)
+    # Years and months have no fixed length, so they become days first.
     if unit in ("Y", "M"):
         array, (unit, count) = array.astype("datetime64[D]"), ("D", 1)
     length = {"W": 604800.0, "D": 86400.0, "h": 3600.0, "m": 60.0, "s": 1.0, "ms": 1e-3}
     length |= {"us": 1e-6, "ns": 1e-9, "ps": 1e-12}
+    # NaT is the smallest integer here, and replaced in the next line.
     numbers = count * length[unit] * array.astype(np.int64).astype(float)
     numbers[np.isnat(array)] = np.nan
     return numbers

@@ -64,6 +64,7 @@ def _data_files(path: Path, episodes: Sequence[int]) -> list[Path]:
     """Return the files of the rows, of v2 only those of the needed episodes."""
     files = sorted((path / "data").rglob("*.parquet"))
     numbered = {file.stem: file for file in files if file.stem.startswith("episode_")}
+    # Version 2 has one file an episode, version 3 many episodes in one file.
     if episodes and len(numbered) == len(files):
         named = [numbered.get(f"episode_{number:06d}") for number in episodes]
         # Without one of them, the numbers of all files say which episodes there are.
@@ -89,6 +90,7 @@ def _labels(information: Mapping[str, Any]) -> dict[str, list[str]]:
     for name, feature in features.items() if isinstance(features, dict) else ():
         names = feature.get("names") if isinstance(feature, dict) else None
         if isinstance(names, dict):
+            # Some data sets group the labels once more: {"motors": ["shoulder", …]}.
             names = next((each for each in names.values() if isinstance(each, list)), None)
         if isinstance(names, list) and all(isinstance(label, str) for label in names):
             labels[name] = names

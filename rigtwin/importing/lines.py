@@ -48,9 +48,11 @@ def find_encoding(path: Path) -> str:
     else Latin-1."""
     with open_bytes(path) as file:
         piece = file.read(PIECE)
+        # UTF-16 is recognised by its mark alone; its zero bytes would also be valid UTF-8.
         for mark, name in MARKS:
             if piece.startswith(mark):
                 return name
+        # Incremental, because a piece may end within a character.
         decoder = codecs.getincrementaldecoder("utf-8")()
         try:
             while piece:
@@ -58,6 +60,7 @@ def find_encoding(path: Path) -> str:
                 piece = file.read(PIECE)
             decoder.decode(b"", final=True)
         except UnicodeDecodeError:
+            # Latin-1 assigns a character to every byte, so it never fails.
             return "latin-1"
     return "utf-8"
 
@@ -68,4 +71,6 @@ def read_lines(path: Path, encoding: str) -> Iterator[str]:
         # The mark of UTF-8 and UTF-16 is no part of the text.
         text = io.TextIOWrapper(cast(Any, file), encoding, errors="replace")
         for line in text:
+            # Unlike the file's own iterator, splitlines also ends lines at form feeds and other
+            # separators.
             yield from line.splitlines()

@@ -9,7 +9,7 @@ import numpy as np
 
 from rigtwin.errors import RigtwinError
 from rigtwin.importing.columns import Columns
-from rigtwin.importing.format import Format
+from rigtwin.importing.format import Format, first_line
 from rigtwin.importing.selection import Selection
 from rigtwin.numerics.arrays import Array
 
@@ -27,6 +27,7 @@ def read_matlab(path: Path, selection: Selection) -> Columns:
 
     try:
         content: Any = loadmat(str(path), squeeze_me=True, struct_as_record=False)
+    # scipy's way to say that the file is HDF5, which MATLAB writes since v7.3.
     except NotImplementedError:
         return _read_hdf(path, selection)
     except (OSError, RigtwinError):
@@ -60,6 +61,7 @@ def _flatten(name: str, value: Any) -> dict[str, Array]:
     array = np.asarray(value)
     if array.dtype.kind not in NUMBERS:
         return {}
+    # Vectors are matrices in MATLAB, with one axis of length 1.
     array = np.squeeze(array)
     return {
         column: _take(array, number) for column, number in _name_columns(name, array.shape).items()
@@ -74,6 +76,7 @@ def _name_columns(name: str, shape: tuple[int, ...]) -> dict[str, int]:
     if len(shape) == 1:
         return {name: 0}
     if len(shape) == 2:
+        # The longer axis is taken as time, so a matrix has as many columns as its shorter one.
         return {f"{name}:{number + 1}": number for number in range(min(shape))}
     return {}
 
@@ -95,9 +98,11 @@ def _read_hdf(path: Path, selection: Selection) -> Columns:
     columns: dict[str, tuple[Any, int, int]] = {}
 
     def list_columns(prefix: str, group: Any, above: tuple[int, ...] = ()) -> None:
+        # Addresses of the objects above, since one object may have several names.
         above = (*above, h5py.h5o.get_info(group.id).addr)
         for name, item in group.items():
             # A link may lead nowhere.
+            # Names with # are MATLAB's own, such as #refs#, and hold the contents of cells.
             if name.startswith("#") or item is None:
                 continue
             if isinstance(item, h5py.Group):
@@ -122,6 +127,7 @@ def _read_hdf(path: Path, selection: Selection) -> Columns:
                 listed.append(column)
                 if not selection.takes(column):
                     continue
+                # The columns of one matrix come one after another; it is read from disk once.
                 if item.name != name:
                     name, content = item.name, np.squeeze(item[()])
                 values[column] = _take(content, number)
@@ -131,8 +137,7 @@ def _read_hdf(path: Path, selection: Selection) -> Columns:
 
 
 def _unreadable(path: Path, error: Exception) -> RigtwinError:
-    reason = (str(error).splitlines() or [type(error).__name__])[0]
-    return RigtwinError(f"{path} is not a MATLAB file, or damaged: {reason}")
+    return RigtwinError(f"{path} is not a MATLAB file, or damaged: {first_line(error)}")
 
 
 FORMAT = Format("MATLAB", (".mat",), read_matlab)

@@ -36,6 +36,7 @@ def name_items(name: str, count: int, labels: Sequence[str] = ()) -> list[str]:
     list of str
         `name[label]`, or `name[0]`, `name[1]`, … without labels.
     """
+    # Labels that do not fit the list are wrong; numbers are at least unambiguous.
     if len(labels) != count or len(set(labels)) < count:
         labels = [str(place) for place in range(count)]
     return [f"{name}[{label}]" for label in labels]

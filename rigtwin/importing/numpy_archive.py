@@ -17,9 +17,11 @@ from rigtwin.importing.selection import Selection
 def read_archive(path: Path, selection: Selection) -> Columns:
     """Read the needed arrays of a file that `numpy.savez` wrote. Raises RigtwinError for any other
     file."""
+    # np.load would take any other file for a pickle, and say so in its error.
     if not zipfile.is_zipfile(path) and path.is_file():
         raise RigtwinError(f"{path} is not an npz file")
     try:
+        # allow_pickle=False, because loading a pickle runs code of whoever made the file.
         with np.load(path, allow_pickle=False) as archive:
             needed = [name for name in archive.files if selection.takes_within(name)]
             passed = tuple(name for name in archive.files if name not in needed)

@@ -32,6 +32,7 @@ def looks_wrapped(counts: Array) -> float | None:
     if len(known) < 2:
         return None
     step, reach = float(np.max(np.abs(np.diff(known)))), float(np.ptp(known))
+    # Nearly the whole range is covered, and one step crosses nearly all of it.
     for wrap in COUNTERS:
         if 0.98 * wrap <= reach <= wrap and step > 0.9 * wrap:
             return wrap
@@ -51,6 +52,7 @@ def find_oddities(values: Array, time: Array) -> list[str]:
     if np.ptp(values) == 0.0:
         return [f"is {values[0]:g} throughout"]
     oddities = []
+    # Quantiles rather than extremes, since the outlier itself must not widen the spread.
     spread = float(np.subtract(*np.quantile(values, [0.999, 0.001])))
     far = np.abs(values - np.median(values))
     if spread > 0.0 and far.max() > OUTLIER * spread:
@@ -58,6 +60,7 @@ def find_oddities(values: Array, time: Array) -> list[str]:
             f"is {values[np.argmax(far)]:.4g} at {time[np.argmax(far)]:.4g} s, "
             "far outside of all else"
         )
+    # Reversed, so that the first run at each end remains in the dictionary.
     ends = {float(values[start]): start for start, _ in reversed(runs_at_ends(values))}
     for extreme, start in ends.items():
         side = "above" if extreme == values.max() else "below"

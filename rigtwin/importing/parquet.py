@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from rigtwin.errors import RigtwinError
 from rigtwin.importing.arrow import expand
 from rigtwin.importing.columns import Columns
-from rigtwin.importing.format import Format
+from rigtwin.importing.format import Format, first_line
 from rigtwin.importing.naming import repeated_names
 from rigtwin.importing.selection import Selection
 
@@ -55,10 +55,11 @@ def read_tables(
 
     tables = [_read(path, needed) for path in paths]
     try:
+        # Permissive: a column may be an integer in one file and a float in another.
         table = pyarrow.concat_tables(tables, promote_options="permissive")
     except pyarrow.ArrowException as error:
         raise RigtwinError(
-            f"{paths[0].parent}: its files do not have the same columns: {_first_line(error)}"
+            f"{paths[0].parent}: its files do not have the same columns: {first_line(error)}"
         ) from None
     expansion = expand(dict(zip(table.column_names, table.columns, strict=True)), labels or {})
     values = {name: column for name, column in expansion.values.items() if selection.takes(name)}
@@ -86,7 +87,7 @@ def _open(path: Path) -> pyarrow.parquet.ParquetFile:
     try:
         return parquet.ParquetFile(path)
     except (pyarrow.ArrowException, OSError) as error:
-        raise RigtwinError(f"{path} is not a parquet file: {_first_line(error)}") from None
+        raise RigtwinError(f"{path} is not a parquet file: {first_line(error)}") from None
 
 
 def _read(path: Path, names: Sequence[str]) -> pyarrow.Table:
@@ -96,13 +97,10 @@ def _read(path: Path, names: Sequence[str]) -> pyarrow.Table:
     if missing := [name for name in names if name not in file.schema_arrow.names]:
         raise RigtwinError(f"{path} lacks the column {missing[0]!r} of the other files")
     try:
+        # pandas metadata would add index columns that nobody asked for.
         return file.read(columns=list(names), use_pandas_metadata=False)
     except (pyarrow.ArrowException, OSError) as error:
-        raise RigtwinError(f"{path} is damaged: {_first_line(error)}") from None
-
-
-def _first_line(error: Exception) -> str:
-    return (str(error).splitlines() or [type(error).__name__])[0]
+        raise RigtwinError(f"{path} is damaged: {first_line(error)}") from None
 
 
 FORMAT = Format("parquet", (".parquet", ".pq"), read_parquet)

@@ -40,6 +40,7 @@ def read_json(path: Path, _: Selection = EVERYTHING) -> Columns:
         lists = {
             name: value
             for name, value in flat.items()
+            # Only lists of plain values are columns; the shorter ones are taken for settings.
             if isinstance(value, list) and value and not isinstance(value[0], list | dict)
         }
         longest = max(map(len, lists.values()), default=0)
@@ -94,6 +95,7 @@ def _of_cells(cells: Mapping[str, Sequence[Any]], form: str, notes: tuple[str, .
     values, wrong, texts = {}, {}, []
     for name, column in cells.items():
         numbers, bad = numbers_of(["" if each is None else _cell(each) for each in column], ".")
+        # Not a single number: a column of words, which is only mentioned.
         if bad is not None and not np.isfinite(numbers).any():
             texts.append(name)
             continue
@@ -106,6 +108,7 @@ def _of_cells(cells: Mapping[str, Sequence[Any]], form: str, notes: tuple[str, .
 
 
 def _cell(value: Any) -> str:
+    # True as text would be a word, while a signal of truth values is 0 and 1.
     return str(float(value)) if isinstance(value, bool) else str(value)
 
 

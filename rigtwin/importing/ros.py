@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from rigtwin.errors import RigtwinError
 from rigtwin.importing.columns import Columns
-from rigtwin.importing.format import Format
+from rigtwin.importing.format import Format, first_line
 from rigtwin.importing.ros_topics import Topic, decoder, list_columns, read_topic
 from rigtwin.importing.selection import Selection
 from rigtwin.importing.series import join_series
@@ -65,10 +65,8 @@ def read_bag(path: Path, selection: Selection) -> Columns:
     except (RigtwinError, MemoryError):
         raise
     except Exception as error:  # The reader raises errors of any kind for a damaged bag.
-        reason = (str(error).splitlines() or [type(error).__name__])[0]
-        hint = ""
-        if "profile" in reason.lower():
-            hint = "; a recording of rigtwin needs no import"
+        reason = first_line(error)
+        hint = "; a recording of rigtwin needs no import" if "profile" in reason.lower() else ""
         raise RigtwinError(f"{path} is not a ROS 2 bag, or damaged: {reason}{hint}") from None
 
 
@@ -87,6 +85,7 @@ def _read(path: Path, reader: Reader, selection: Selection) -> Columns:
     for name, connections in by_topic.items():
         types = {connection.msgtype for connection in connections}
         decode = find(connections[0].msgtype)
+        # Topics that cannot be read are an error only if somebody asks for them.
         if decode is None or len(types) > 1:
             why = f"topic {name} has messages of several types: {', '.join(sorted(types))}"
             if decode is None:
@@ -104,12 +103,7 @@ def _read(path: Path, reader: Reader, selection: Selection) -> Columns:
     return replace(joined, listed=tuple(listed), refused={**refused, **joined.refused})
 
 
-def _join(
-    path: Path,
-    topics: Sequence[Topic],
-    selection: Selection,
-    clock: str,
-) -> Columns:
+def _join(path: Path, topics: Sequence[Topic], selection: Selection, clock: str) -> Columns:
     """Join the topics on the times of one of them, the column `clock`."""
     leader = _leader(topics, selection)
     notes = [
@@ -120,6 +114,8 @@ def _join(
     base = _times(leader)
     offset = leader.delay or 0
     values: dict[str, Array] = {}
+    # The delay is recording time minus header stamp: a difference of two topics' delays is the
+    # difference of their clocks, apart from transport.
     for topic in topics:
         shift = (topic.delay or 0) - offset
         if abs(shift) > ONE_CLOCK:
@@ -132,15 +128,11 @@ def _join(
         if topic is not leader and topic.series:
             join = next(iter(topic.series.values())).join
             notes.append(f"{topic.name} is {join.value} at the times of {leader.name}")
-    least = 0.0 if selection.names is not None else COMMON
-    refused = {
-        name: f"its messages cover {np.mean(np.isfinite(column)):.0%} of those of {leader.name}"
-        for name, column in values.items()
-        if np.mean(np.isfinite(column)) <= least
-    }
+    refused = _list_sparse(values, leader, 0.0 if selection.names is not None else COMMON)
     values = {name: column for name, column in values.items() if name not in refused}
     if not values:
         return Columns({}, refused=refused)
+    # Rows where all signals exist: the test begins with the last topic, and ends with the first.
     known = np.all([np.isfinite(column) for column in values.values()], axis=0)
     if not known.any():
         raise RigtwinError(
@@ -166,12 +158,22 @@ def _join(
     )
 
 
+def _list_sparse(values: Mapping[str, Array], leader: Topic, least: float) -> dict[str, str]:
+    """Return the signals that cover at most a share of the rows, and why they are refused."""
+    return {
+        name: f"its messages cover {np.mean(np.isfinite(column)):.0%} of those of {leader.name}"
+        for name, column in values.items()
+        if np.mean(np.isfinite(column)) <= least
+    }
+
+
 def _leader(topics: Sequence[Topic], selection: Selection) -> Topic:
     """Return the topic whose messages are the rows."""
     for column in selection.time:
         for topic in topics:
             if column.rpartition(".")[0] == topic.name:
                 return topic
+    # Joint states are the natural rows of a robot; otherwise the fastest topic.
     return max(topics, key=lambda topic: (topic.type == JOINT_STATE, len(topic.times)))
 
 

@@ -9,13 +9,7 @@ from functools import partial
 from statistics import median_low
 from typing import TYPE_CHECKING, Any
 
-from rigtwin.importing.ros_messages import (
-    MEASURED,
-    TRAJECTORY,
-    list_numbers,
-    list_points,
-    stamp_of,
-)
+from rigtwin.importing.ros_messages import MEASURED, TRAJECTORY, list_numbers, list_points, stamp_of
 from rigtwin.importing.series import Join, Series
 
 if TYPE_CHECKING:
@@ -93,6 +87,7 @@ def read_topic(
         The needed columns.
     """
     topic = Topic(connections[0].topic, connections[0].msgtype)
+    # What is measured changes between samples; what is commanded changes only with them.
     join = Join.INTERPOLATE if topic.type.startswith(MEASURED) else Join.HOLD
     plans = topic.type == TRAJECTORY
     delays: list[int] = []
@@ -103,6 +98,7 @@ def read_topic(
         if stamp is not None:
             delays.append(recorded - stamp)
         begin = recorded if stamp is None or by_recorder else stamp
+        # Messages may overtake each other on the way; series are sorted before use.
         topic.unordered += begin < latest
         latest = begin
         topic.times.append(begin)
@@ -121,6 +117,7 @@ def read_topic(
                     series.join = Join.PLAN if len(message.points) > 1 else series.join
                 series.add(begin + after, number)
     if delays and not by_recorder:
+        # The median is robust against messages that waited; median_low stays an integer of ns.
         topic.delay = median_low(delays)
     return topic
 
@@ -152,6 +149,7 @@ def decoder(connections: Sequence[Connection]) -> Callable[[str], Decode | None]
     for connection in connections:
         if connection.msgdef.format == MessageDefinitionFormat.MSG:
             types = get_types_from_msg(connection.msgdef.data, connection.msgtype)
+            # Several connections bring the definition of one type; the first is kept.
             embedded.register({k: v for k, v in types.items() if k not in embedded.fielddefs})
 
     def find(kind: str) -> Decode | None:

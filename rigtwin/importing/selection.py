@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from rigtwin.importing.naming import split_unit
@@ -30,15 +29,12 @@ class Selection:
     def __post_init__(self) -> None:
         # A map may name a column as the file's first line does, with the unit behind the name.
         names = self.names or ()
+        # The dataclass is frozen, and this field derives from the others.
         object.__setattr__(self, "_bare", frozenset(split_unit(name, "")[0] for name in names))
 
     def takes(self, name: str) -> bool:
         """Return whether a column is needed."""
         return self.names is None or name in self.names or name in self._bare
-
-    def takes_any(self, names: Iterable[str]) -> bool:
-        """Return whether at least one of these columns is needed."""
-        return any(self.takes(name) for name in names)
 
     def takes_within(self, name: str) -> bool:
         """Return whether a column is needed, or a part of it: `name.field`, `name[0]`, `name:1`."""

@@ -55,6 +55,7 @@ class Series:
     def sorted(self) -> tuple[NDArray[np.int64], Array]:
         """Return times in ns, rising, and the values, both of shape (samples,)."""
         times = np.array(self.times, np.int64)
+        # Stable: of samples with one time the last received one stays last.
         order = np.argsort(times, kind="stable")
         return times[order], np.array(self.numbers, float)[order]
 
@@ -81,6 +82,7 @@ def join_series(series: Series, base: NDArray[np.int64], shift: int = 0) -> Arra
     if not len(times):
         return np.full(len(base), np.nan)
     times = times + shift
+    # Signals of one message share its times, and need no interpolation.
     if np.array_equal(times, base):
         return values
     # Times since the first row, so that floats resolve them.
@@ -89,6 +91,7 @@ def join_series(series: Series, base: NDArray[np.int64], shift: int = 0) -> Arra
     if series.join is Join.HOLD:
         last = np.searchsorted(times, base, side="right") - 1
         return np.where(last >= 0, values[np.maximum(last, 0)], np.nan)
+    # np.interp holds the end values outside, which are then removed where they are not known.
     joined = np.interp(rows, since, values)
     joined[base < times[0]] = np.nan
     if series.join is Join.INTERPOLATE:

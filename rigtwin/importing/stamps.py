@@ -25,6 +25,7 @@ def clock_of(cell: str) -> float | None:
     if match is None:
         return None
     hours, minutes, seconds, half = match.groups()
+    # 12 a.m. is midnight and 12 p.m. noon, hence modulo 12.
     hour = int(hours) % 12 + 12 * (half.lower() == "pm") if half else int(hours)
     return 3600.0 * hour + 60.0 * int(minutes) + float((seconds or "0").replace(",", "."))
 
@@ -69,12 +70,14 @@ def _is_day_first(cells: Sequence[str]) -> bool:
     if any(cell.strip().lower().endswith("m") for cell in cells):
         return False
     days = [(int(pair.group(1)), int(pair.group(3))) for pair in pairs]
+    # A recording spans more days than months, so the number that varies more is the day.
     return len({month for _, month in days}) <= len({month for month, _ in days})
 
 
 def _date(cell: str, day_first: bool) -> float | None:
     try:
         if _ISO.fullmatch(cell):
+            # Loggers of some countries write a decimal comma in the seconds.
             date = datetime.fromisoformat(cell.replace(",", "."))
         elif _DATE.fullmatch(cell):
             date = parser.parse(cell.replace(",", "."), dayfirst=day_first)

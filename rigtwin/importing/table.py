@@ -69,6 +69,7 @@ def read(path: Path, selection: Selection = EVERYTHING) -> Columns:
         columns = known.read(path, selection)
     except OSError as error:
         raise RigtwinError(f"cannot read {path}: {error.strerror or error}") from None
+    # Better here than later as an unknown column: the file is the wrong one, not the map.
     if not columns.names:
         refused = "".join(
             f"; column {name!r}: {why}" for name, why in list(columns.refused.items())[:3]

@@ -91,6 +91,7 @@ def read_text(path: Path, selection: Selection = EVERYTHING) -> Columns:
     """
     encoding = find_encoding(path)
     head = list(islice(read_lines(path, encoding), HEADER))
+    # Blank lines at the end would count as lines of another shape in a short file.
     while head and not head[-1].strip():
         head.pop()
     try:
@@ -121,16 +122,19 @@ def read_text(path: Path, selection: Selection = EVERYTHING) -> Columns:
     form = f"text, separated by {mark}, decimal {layout.decimal}, data from line {layout.first + 1}"
     if layout.words:
         form += f"; words in {', '.join(layout.names[place] for place in sorted(layout.words))}"
-        first = split_cells(head[layout.first], layout.separator)
-        refused |= {
-            layout.names[
-                place
-            ]: f"it holds {first[place][:40]!r} in line {layout.first + 1}, which "
-            "was taken for a word; expected plain numbers, such as 1234.5, without thousands "
-            "separators, and not hexadecimal"
-            for place in layout.words
-        }
+        refused |= _refuse_words(layout, head[layout.first])
     return Columns(values, units, form, notes, wrong, listed=tuple(known), refused=refused)
+
+
+def _refuse_words(layout: Layout, line: str) -> dict[str, str]:
+    """Return the columns that hold words in the first line of data, and why they are refused."""
+    cells = split_cells(line, layout.separator)
+    return {
+        layout.names[place]: f"it holds {cells[place][:40]!r} in line {layout.first + 1}, which "
+        "was taken for a word; expected plain numbers, such as 1234.5, without thousands "
+        "separators, and not hexadecimal"
+        for place in layout.words
+    }
 
 
 def _read_columns(
@@ -163,6 +167,8 @@ def find_layout(lines: Sequence[str]) -> Layout | None:
         for decimal in (".", ","):
             if decimal == separator:
                 continue
+            # Every combination is tried on the head: a decimal comma is only told from a
+            # separating one by which reading gives the more columns of numbers.
             seen = [_look_at(line, separator, decimal) for line in lines[:HEADER]]
             first = next((n for n in range(len(seen)) if _begins(seen, n)), None)
             if first is None:
@@ -173,6 +179,8 @@ def find_layout(lines: Sequence[str]) -> Layout | None:
             if (
                 separator == ","
                 and all("." not in line for line in lines[first : first + SURE])
+                # Numbers such as 1,5;2,5 split at commas give twice the columns; half of them is
+                # what another separator has to beat.
                 and numbers % 2 == 0
             ):
                 quality = (numbers // 2, -SEPARATORS.index(separator))
@@ -190,6 +198,7 @@ def _begins(seen: Sequence[Line], at: int) -> bool:
         start.numbers > 0
         and len(start.words) < start.cells
         and all((each.cells, each.words) == (start.cells, start.words) for each in block)
+        # A file shorter than SURE lines may end within the block.
         and (len(block) == SURE or at + len(block) == len(seen))
     )
 
@@ -208,6 +217,7 @@ def _read_header(lines: Sequence[str], layout: Layout, columns: int) -> Layout:
     names, units = [f"column{n + 1}" for n in range(columns)], [""] * columns
     if above:
         nearest = above[0]
+        # A line of units alone, below the names.
         marked = all(is_unit(cell) for cell in nearest)
         if marked and len(above) > 1:
             names, units = above[1], nearest

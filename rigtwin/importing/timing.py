@@ -56,6 +56,7 @@ def find_period(time: Array) -> float:
     typical = float(np.median(steps))
     regular = np.abs(steps - typical) < JITTER * typical
     period = float(np.mean(steps[regular]))
+    # The stamps allow a rounding that moves the last of them by less than the jitter.
     for digits in range(1, 8):
         rounded = float(f"{period:.{digits}g}")
         if (
@@ -108,12 +109,12 @@ def require_even_ticks(time: Array, period: float, report: list[str]) -> None:
     if off.any():
         at = int(np.argmax(off))
         raise RigtwinError(
-            f"{int(off.sum())} gaps in time, "
-            f"the first of {steps[at]:.4g} s at {time[at] - time[0]:.4g} s where "
-            f"{period:g} s is the rule; take a stretch without them by [time] start and until, "
-            f"or say [time] resample = {period:g}"
+            f"{int(off.sum())} gaps in time, the first of {steps[at]:.4g} s at "
+            f"{time[at] - time[0]:.4g} s where {period:g} s is the rule; take a stretch without "
+            f"them by [time] start and until, or say [time] resample = {period:g}"
         )
     drift = abs((time[-1] - time[0]) / (len(time) - 1) - period)
+    # The drift over the whole test counts, not that of one period.
     if drift * len(time) > JITTER * period:
         report.append(
             f"time stamps drift: on average every {(time[-1] - time[0]) / (len(time) - 1):.6g} s, "
@@ -144,6 +145,8 @@ def resample(
     ticks = np.arange(int((time[-1] - time[0]) / wanted + 1e-6) + 1) * wanted + time[0]
     resampled = {}
     for name, values in signals.items():
+        # Without delay, by filtering both ways: channels must stay in phase with each other. A
+        # short signal has not enough samples for the filter to settle.
         if wanted > 1.5 * period and len(values) > 60:
             values = sosfiltfilt(butter(4, 0.8 * period / wanted, output="sos"), values)
         resampled[name] = np.interp(ticks, time, values)

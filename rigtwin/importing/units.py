@@ -162,6 +162,7 @@ def unit_of(text: str) -> tuple[str, float]:
 
     Raises RigtwinError for an unknown unit, with the list of known ones.
     """
+    # Units often stand in brackets: [mm], (N).
     name = re.sub(r"^[\[(]|[\])]$", "", text.strip()).strip()
     for spelling in (name, re.sub(r"\s*[·*.\- ]\s*", " ", name)):
         unit = _SPELLINGS.get(spelling, spelling)
@@ -174,6 +175,7 @@ def unit_of(text: str) -> tuple[str, float]:
         for known in (*UNITS, *_SPELLINGS)
         if known.lower() == small
     }
+    # Up to two letters capitals decide: mN and MN, ms and Ms.
     if len(matches) == 1 and len(name) > 2:
         return matches.pop()
     raise RigtwinError(f"unknown unit {text!r}; there are {', '.join(UNITS)}")

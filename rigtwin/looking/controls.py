@@ -84,6 +84,7 @@ class Controls:
     def _add(self, server: viser.ViserServer, name: str, label: str) -> None:
         effect = self._look.effects[name]
         tick = server.gui.add_checkbox(label, False, hint=effect.kind.meaning)
+        # Bound as an argument of the call, not of the loop: each box keeps its own effect.
         tick.on_update(lambda event: self._on_tick(name, event))
         self._ticks[name] = tick
         self._handles[name] = []

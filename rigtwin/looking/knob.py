@@ -65,6 +65,7 @@ class Knob:
     def value(self, position: float) -> float:
         """Return the value of a position, in the slider's unit and within its range."""
         meant = 10.0**position if self.logarithmic else position / self.factor
+        # Rounding of a logarithm may lead beyond the ends.
         return min(max(meant, self.slider.low), self.slider.high)
 
 

@@ -133,11 +133,7 @@ class LivePage:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _follow(
-        self,
-        follow: Follow,
-        look_back: Callable[[LocalServer, Watch], Page],
-    ) -> None:
+    def _follow(self, follow: Follow, look_back: Callable[[LocalServer, Watch], Page]) -> None:
         """Watch the test, then replace the page by a look at the recording."""
         try:
             watch, ended = self._watch_to_its_end(follow)
@@ -151,6 +147,7 @@ class LivePage:
             if ended:
                 self._page.add_note(ended)
         except BaseException as error:  # handed to the thread that waits for the page
+            # After closing, errors are expected: the server that they come from is gone.
             if not self._closed:
                 self._failure = error
         finally:
@@ -225,11 +222,9 @@ class LivePage:
         row = next(n for n, row in enumerate(watch.machine.rows) if row.name == self._sensor.value)
         # Beyond `judged` the band filter lacks what follows, and distorts the signal.
         known = gap.time < watch.judged
-        time, measured, predicted = (
-            gap.time[known],
-            gap.measured[row][known],
-            gap.predicted[row][known],
-        )
+        time = gap.time[known]
+        measured = gap.measured[row][known]
+        predicted = gap.predicted[row][known]
         residual = measured - predicted
         self._plots.name(
             self._sensor.value,

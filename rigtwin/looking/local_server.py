@@ -57,6 +57,7 @@ def open_server(port: int, label: str) -> LocalServer:
         raise RigtwinError(f"port {port}: expected 0 to {PORTS}")
     # viser silently uses the next port if one is in use, so the port is probed first.
     with socket.socket() as probe:
+        # A port whose last page was closed moments ago is free, although connections linger.
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             probe.bind((HOST, port))
@@ -96,6 +97,7 @@ def _for_its_own_pages() -> Iterator[None]:
 
         def answer(connection: Any, request: Any) -> Any:
             # Host guards against DNS rebinding, Origin against pages of other servers.
+            # A program other than a browser sends no Origin, and is let in.
             asked, by = request.headers.get_all("Host"), request.headers.get_all("Origin")
             if not set(asked) <= hosts or not set(by) <= origins:
                 return connection.respond(HTTPStatus.FORBIDDEN, "for pages of this server alone\n")

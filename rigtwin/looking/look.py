@@ -163,6 +163,7 @@ class Look:
         return tuple(rival for rival in names if clashes(effect, [self._find(rival)]))
 
     def _sliders(self, effect: Effect) -> tuple[Slider, ...]:
+        # The slider has the bounds of the fit, so that a fitted value always has a position.
         low, high = self._fitter.bounds((effect,))
         return sliders_of(
             effect,

@@ -66,6 +66,7 @@ class Page:
             stop_server(self._server)
             raise
         self._threads = [
+            # Daemons: a prediction that hangs must not keep the program alive.
             threading.Thread(target=self._guard, args=(work,), daemon=True)
             for work in (self._predict, self._draw)
         ]
@@ -201,6 +202,7 @@ class Page:
     def _take(self, prediction: Prediction) -> None:
         """Show a new prediction."""
         moved = self._look.positions(prediction) if self._look.predicts_motion else self._measured
+        # Both change together, so that no picture shows one twin's errors and another's motion.
         with self._wake:
             self._prediction, self._predicted = prediction, moved
         self._refresh("text", "plots", "scene")

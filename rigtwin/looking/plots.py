@@ -43,6 +43,7 @@ class Plots:
             uplot.Series(label=twin, stroke=colour, width=1.2) for twin, colour in twins.items()
         ]
         measured = uplot.Series(label="measured", stroke=MEASURED, width=1.2)
+        # uPlot takes x for seconds since 1970 unless told otherwise.
         scales = {"x": uplot.Scale(time=False)}
         time = np.array([start, end])
         self._traces = server.gui.add_uplot(

@@ -27,6 +27,7 @@ def shorten(largest: float, unit: str) -> tuple[float, str]:
         the unit with another power of a thousand in front.
     """
     unit = "" if unit == "1" else unit
+    # Zero, infinity and NaN have no power of ten.
     if not 0.0 < largest < math.inf or LEAST <= largest < LARGEST:
         return 1.0, unit
     # The next lower power of 1000 that leaves at least one digit before the point.

@@ -65,10 +65,7 @@ class Scene:
         self._ghost = _add(server, "/ghost", moving, GHOST) if ghost else {}
 
     def draw(
-        self,
-        measured: Mapping[str, float],
-        predicted: Mapping[str, float],
-        magnify: float,
+        self, measured: Mapping[str, float], predicted: Mapping[str, float], magnify: float
     ) -> None:
         """Move the machine and its ghost.
 

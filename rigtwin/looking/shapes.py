@@ -177,9 +177,11 @@ class PosedMachine:
         tuple of Array
             Positions in m, shape (bodies, 3), and quaternions, shape (bodies, 4).
         """
+        # Joints without a position keep the reference pose of the MJCF.
         self._data.qpos[:] = self._model.qpos0
         for joint, position in positions.items():
             self._data.qpos[self._model.joint(joint).qposadr[0]] = position
+        # Kinematics alone: a picture needs no forces.
         mujoco.mj_kinematics(self._model, self._data)
         return self._data.xpos.copy(), self._data.xquat.copy()
 
@@ -272,6 +274,7 @@ def _triangles(model: mujoco.MjModel, number: int) -> trimesh.Trimesh | None:
     if kind == geom.mjGEOM_SPHERE:
         return make.icosphere(subdivisions=BALL, radius=float(size[0]))
     if kind == geom.mjGEOM_ELLIPSOID:
+        # A unit ball stretched along its three axes.
         return make.icosphere(subdivisions=BALL).apply_scale(size)
     if kind == geom.mjGEOM_CYLINDER:
         return make.cylinder(radius=float(size[0]), height=2.0 * float(size[1]))
@@ -286,6 +289,7 @@ def _triangles(model: mujoco.MjModel, number: int) -> trimesh.Trimesh | None:
         mesh = int(model.geom_dataid[number])
         start, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
         first, faces = int(model.mesh_faceadr[mesh]), int(model.mesh_facenum[mesh])
+        # Unprocessed: merging vertices would lose the sharp edges of the mesh.
         return trimesh.Trimesh(
             model.mesh_vert[start : start + count],
             model.mesh_face[first : first + faces],

@@ -104,13 +104,7 @@ def read_diagnosis(path: str | Path, look: Look) -> StartingPoint:
         If the file cannot be read, is no diagnosis, or belongs to other recordings or to another
         machine.
     """
-    try:
-        document = json.loads(Path(path).read_text())
-    except OSError as error:
-        raise RigtwinError(f"cannot read {path}: {error.strerror}") from None
-    except (ValueError, RecursionError):
-        raise RigtwinError(f"{path}: expected the JSON of rigtwin diagnose --json") from None
-    return from_document(document, look, str(path))
+    return from_document(_read_document(path), look, str(path))
 
 
 def from_document(document: Mapping[str, Any], look: Look, path: str) -> StartingPoint:
@@ -155,6 +149,7 @@ def from_document(document: Mapping[str, Any], look: Look, path: str) -> Startin
         )
     possible = {effect.name for effect in look.machine.effects()}
     for effect, _, _ in findings:
+        # Findings on the controller's settings are no effects of the machine, but valid.
         if effect not in possible and not effect.endswith("@controller"):
             raise RigtwinError(f"{path}: {machine} can have no {effect}")
     values = {
@@ -170,6 +165,15 @@ def from_document(document: Mapping[str, Any], look: Look, path: str) -> Startin
         tuple(effect for effect, _, _ in findings if effect not in values),
         {effect: confidence for effect, _, confidence in findings},
     )
+
+
+def _read_document(path: str | Path) -> Any:
+    try:
+        return json.loads(Path(path).read_text())
+    except OSError as error:
+        raise RigtwinError(f"cannot read {path}: {error.strerror}") from None
+    except (ValueError, RecursionError):
+        raise RigtwinError(f"{path}: expected the JSON of rigtwin diagnose --json") from None
 
 
 def _finding(entry: Mapping[str, Any]) -> tuple[str, dict[str, float], float]:

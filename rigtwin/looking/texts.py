@@ -105,4 +105,5 @@ def _describe_suspect(watch: Watch, suspect: Suspect) -> str:
 
 
 def _percent(value: float) -> str:
+    # A diverged twin is off by numbers that say nothing.
     return f"{value:.3g} %" if value < 999.5 else "over 999 %"

@@ -77,6 +77,7 @@ class Timeline:
     @property
     def plays(self) -> bool:
         """Whether the recording plays: a user asked for it, and a browser is connected."""
+        # Without a browser nobody sees it play, and drawing would use a core for nothing.
         return self._play.value and bool(self._server.get_clients())
 
     @property

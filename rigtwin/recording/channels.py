@@ -79,9 +79,13 @@ def channels_of(
         Channels with unit and meaning, empty where they are unknown.
     """
     present = [(topic, name) for topic, names in columns.items() for name in names]
+    # Another program's recording may lack a machine, which then reads as the rig; only its
+    # sensors' names show that it is one.
     rig = machine == DEFAULT_MACHINE and any(
         topic == "/sensor" and name in Measurements._fields for topic, name in present
     )
+    # The table's order, not the file's, so that exports of all rig recordings have the same
+    # columns.
     known = [c for c in CHANNELS if rig and (c.topic, c.name) in present]
     named = {(channel.topic, channel.name) for channel in known}
     return known + [

@@ -50,6 +50,7 @@ def decode_columns(
     elif channel.message_encoding == "protobuf":
         if schema is None:
             raise RigtwinError(f"{path}: {channel.topic} is protobuf without a schema")
+        # The compiled layout applies only if the tags are those of `encode_rows`, in its order.
         present, numbers, decode = _protobuf(path, schema)
         # Messages of doubles numbered 1, 2, … have equal lengths: numpy decodes a whole block.
         if numbers == list(range(1, len(present) + 1)):
@@ -94,6 +95,8 @@ def _decode_singly(
 
 def _json_at_once(data: list[bytes]) -> list[Mapping[str, Any]] | None:
     """Decode flat JSON objects as one array, twice as fast as singly; None for anything else."""
+    # One brace pair means no nested object and, almost surely, no text with braces. A wrong guess
+    # costs only time: the rows are checked below.
     if not all(item.count(b"{") == 1 == item.count(b"}") for item in data):
         return None
     try:
@@ -111,6 +114,7 @@ def _numbers(rows: list[Mapping[str, Any]]) -> list[str]:
         [
             name
             for name in rows[0]
+            # A name with control characters could act on the terminal that prints it.
             if name.isprintable() and {type(row.get(name)) for row in rows} <= {int, float, bool}
         ]
         if rows

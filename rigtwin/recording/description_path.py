@@ -38,6 +38,7 @@ def description_values(recording: Path, description: Path | None) -> dict[str, s
         # On Windows, files of two drives have no relative path.
         return {KEY: target.as_posix()}
     near = relative.parts.count(os.pardir) <= FARTHEST
+    # Forward slashes, so that a recording made on Windows is found on Linux.
     return {KEY: (relative if near else target).as_posix()}
 
 
@@ -56,6 +57,7 @@ def description_of(recording: Path, values: Mapping[str, str]) -> Path | None:
     Path or None
         The path, whether the file still exists or not; None if none is remembered.
     """
+    # A zero byte would make the system's calls raise ValueError instead of finding no file.
     text = values.get(KEY, "")
     if not text or "\0" in text:
         return None

@@ -45,6 +45,7 @@ def _csv(recording: Recording) -> bytes:
         [recording.time, *(recording.column(c.topic, c.name) for c in channels)]
     )
     written = StringIO()
+    # The csv module quotes names with commas; savetxt would write them bare.
     csv.writer(written, lineterminator="\n").writerows([names, units])
     # 15 digits are the most that every decimal text survives as a double.
     np.savetxt(written, table, fmt="%.15g", delimiter=",")

@@ -113,6 +113,7 @@ class GrowingRecording:
         """Takes the next record, if all of it was read."""
         waiting = len(self._buffer) - self._at
         if not self._begun:
+            # A file that has just been created may hold only part of the magic bytes.
             if not MCAP0_MAGIC.startswith(self._buffer[: len(MCAP0_MAGIC)]):
                 raise RigtwinError(f"{self.path} is not an MCAP file")
             if waiting < len(MCAP0_MAGIC):
@@ -121,12 +122,14 @@ class GrowingRecording:
             return True
         if self._lost:
             return self._find_chunk()
+        # The magic bytes appear a second time only at the end of a complete file.
         if self._buffer.startswith(MCAP0_MAGIC, self._at):
             self._over = True
             return False
         if waiting < _PREFIX.size:
             return False
         opcode, length = _PREFIX.unpack_from(self._buffer, self._at)
+        # A corrupt length would otherwise make the reader wait for bytes that never come.
         if not is_opcode(opcode) or length > LONGEST:
             self._note_damage()
             return True
@@ -148,6 +151,7 @@ class GrowingRecording:
         """Goes on at the next chunk behind damage; False if it has not been read yet."""
         chunk = find_chunk(self._buffer, self._searched)
         if chunk is None:
+            # A chunk's head may be cut by the end of what was read, so that many bytes are kept.
             self._at = self._searched = max(len(self._buffer) - CHUNK_HEAD, self._searched)
             return False
         self._lost, self._at = False, chunk
@@ -168,6 +172,8 @@ class GrowingRecording:
 
     def _add(self, record: bytes) -> bool:
         """Takes a record; False if it is damaged."""
+        # These say nothing about the content: a summary's place, a checksum, an index, or another
+        # program's data.
         if record[0] >= PRIVATE or record[0] in (
             Opcode.FOOTER,
             Opcode.DATA_END,
@@ -177,6 +183,7 @@ class GrowingRecording:
         reader = StreamReader(io.BytesIO(record), skip_magic=True, emit_chunks=True)
         try:
             whole = next(reader.records)
+            # A chunk whose own lengths do not fill its record has one that is damaged.
             if isinstance(whole, Chunk) and length_of(whole) != len(record) - _PREFIX.size:
                 return False
             parts = take_apart(whole) if isinstance(whole, Chunk) else [whole]

@@ -33,6 +33,7 @@ class Inputs:
     @property
     def ticks(self) -> int:
         """Number of ticks."""
+        # All channels have the same number of ticks, so any of them will do.
         signals = (values for names in self.columns.values() for values in names.values())
         return len(next(signals, ()))
 

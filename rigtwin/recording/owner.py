@@ -35,6 +35,7 @@ def open_alone(path: Path) -> BinaryIO:
     """
     # Windows would otherwise translate line ends.
     binary = getattr(os, "O_BINARY", 0)
+    # No O_TRUNC: the content must survive until the lock is ours.
     handle = os.open(path, os.O_RDWR | os.O_CREAT | binary, 0o666)
     try:
         # Devices and pipes cannot be locked or truncated.
@@ -46,6 +47,8 @@ def open_alone(path: Path) -> BinaryIO:
                     f"{path} is being written by another program; name another output"
                 ) from None
             os.ftruncate(handle, 0)
+        # Unbuffered, so that a block is with the system when the call returns, and survives this
+        # process.
         return os.fdopen(handle, "wb", buffering=0)
     except BaseException:
         os.close(handle)

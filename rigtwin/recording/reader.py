@@ -20,6 +20,7 @@ from machines import DEFAULT_MACHINE
 from rigtwin.errors import RigtwinError
 from rigtwin.files import printable
 from rigtwin.numerics.arrays import Array
+from rigtwin.recording.alignment import align, check_order, check_times
 from rigtwin.recording.columns import decode_columns
 from rigtwin.recording.description_path import description_of
 from rigtwin.recording.inputs import Inputs
@@ -36,10 +37,6 @@ from rigtwin.recording.schema import (
 
 if TYPE_CHECKING:
     import pandas
-
-WRONG_PERIOD, DOUBTFUL_PERIOD = 0.02, 1e-3
-"""Shares by which the spacing of time stamps may differ from the declared period: above the first a
-recording is refused, above the second it has a note."""
 
 
 @dataclass(frozen=True)
@@ -175,11 +172,13 @@ def load(path: Path) -> Recording:
     content = FileContent()
     try:
         with path.open("rb") as file:
+            # An empty file gets a message of its own; the MCAP reader would call it damaged.
             if not file.read(1):
                 raise RigtwinError(f"{path} is empty; expected an MCAP recording")
             file.seek(0)
             for record in read_records(file):
                 content.add(record)
+    # mcap unpacks whatever a read returns, so a file that ends early raises struct.error.
     except (InvalidMagic, struct.error):
         raise RigtwinError(f"{path} is not an MCAP file") from None
     except OSError as error:
@@ -231,6 +230,7 @@ class FileContent:
             values, whole = unseal(record.metadata)
             if not whole:
                 self._doubtful.append(record.name)
+            # The last record of a name counts: a writer can add to a file, but not change it.
             self._metadata[record.name] = values
             # A full disk makes the writer repeat a transition, so duplicates are dropped.
             if record.name == TRANSITION_RECORD and values not in self._states:
@@ -280,14 +280,7 @@ class FileContent:
         controller = {} if RECORD in doubtful else _controller(path, about)
         notes: list[str] = []
         tables = self._tables(path, notes)
-        if not tables:
-            said = (
-                f"; it ended: {metadata[END_RECORD].get('reason', '')}"
-                if END_RECORD in metadata
-                else ""
-            )
-            raise RigtwinError(f"{path} holds no ticks on {' or '.join(list_topics())}{said}")
-        time, columns = _align(tables, notes)
+        time, columns = align(tables, notes)
         # Damage comes first among the notes.
         notes[:0] = _describe_damage(lost, doubtful, time)
         if not len(time):
@@ -295,7 +288,7 @@ class FileContent:
                 f"{path}: {' and '.join(tables)} have no tick in common; "
                 "expected the same times on each"
             )
-        _check_times(path, time, period, notes)
+        check_times(path, time, period, notes)
         return Recording(
             path=path,
             machine=printable(about.get("machine", DEFAULT_MACHINE)),
@@ -333,8 +326,12 @@ class FileContent:
             # Times stay in whole nanoseconds until topics are aligned: doubles would not compare
             # equal.
             stamps = np.array(times, np.int64)
-            _check_order(path, channel.topic, stamps, notes)
+            check_order(path, channel.topic, stamps, notes)
             tables[channel.topic] = (stamps, values)
+        if not tables:
+            end = self._metadata.get(END_RECORD)
+            said = "" if end is None else f"; it ended: {end.get('reason', '')}"
+            raise RigtwinError(f"{path} holds no ticks on {' or '.join(list_topics())}{said}")
         return tables
 
 
@@ -374,6 +371,7 @@ def transitions(path: Path) -> tuple[Mapping[str, str], ...]:
     RigtwinError
         If the file cannot be read at all.
     """
+    # Only metadata are needed, so messages are not decoded and a file without ticks is no error.
     states: list[Mapping[str, str]] = []
     try:
         with path.open("rb") as file:
@@ -383,6 +381,7 @@ def transitions(path: Path) -> tuple[Mapping[str, str], ...]:
                     states += [values] if values not in states else []
     except OSError as error:
         raise RigtwinError(f"cannot read {path}: {error.strerror}") from None
+    # A file that is no recording has no transitions; `load` is what complains about it.
     except (InvalidMagic, struct.error):
         pass
     return _sort(states)
@@ -390,6 +389,7 @@ def transitions(path: Path) -> tuple[Mapping[str, str], ...]:
 
 def _sort(transitions: list[Mapping[str, str]]) -> tuple[Mapping[str, str], ...]:
     """Return transitions by time; on a full disk the last are in space reserved at the start."""
+    # Sorting is stable: transitions at one time keep the order in which they were written.
     return tuple(sorted(map(_printable, transitions), key=_moment))
 
 
@@ -402,6 +402,7 @@ def _moment(transition: Mapping[str, str]) -> float:
     """Return the time of a transition in s; infinite if it cannot be read."""
     try:
         return float(transition.get("time", ""))
+    # At the end: a time that cannot be read must not move the known transitions.
     except ValueError:
         return math.inf
 
@@ -438,66 +439,3 @@ def _controller(path: Path, about: Mapping[str, str]) -> Mapping[str, object]:
         printable(name): printable(value) if isinstance(value, str) else value
         for name, value in controller.items()
     }
-
-
-def _check_order(path: Path, topic: str, stamps: NDArray[np.int64], notes: list[str]) -> None:
-    """Note messages that are out of order. Raise RigtwinError if most of them are."""
-    falls = int(np.sum(np.diff(stamps) < 0))
-    # A few messages out of order are normal for several writers; a reversed clock is not.
-    if 2 * falls > len(stamps) - 1:
-        raise RigtwinError(
-            f"{path}: time on {topic} runs backwards, from {stamps[0] * 1e-9:.3f} s to "
-            f"{stamps[-1] * 1e-9:.3f} s; expected rising times"
-        )
-    if falls:
-        notes.append(f"{falls} messages on {topic} come after later ones; sorted by time")
-
-
-def _align(
-    tables: Mapping[str, tuple[NDArray[np.int64], dict[str, Array]]], notes: list[str]
-) -> tuple[Array, dict[str, dict[str, Array]]]:
-    """Return the ticks that all topics have in common, in order."""
-    first, *rest = (times for times, _ in tables.values())
-    # Nearly always all topics have the same ascending times, and nothing needs to be sorted.
-    if (np.diff(first) > 0).all() and all(np.array_equal(first, times) for times in rest):
-        return first * 1e-9, {topic: dict(values) for topic, (_, values) in tables.items()}
-    common = np.unique(first)
-    for times in rest:
-        common = np.intersect1d(common, times)
-    columns: dict[str, dict[str, Array]] = {}
-    for topic, (times, values) in tables.items():
-        _, first = np.unique(times, return_index=True)
-        keep = first[np.isin(times[first], common)]
-        if len(keep) < len(times):
-            notes.append(
-                f"{len(times) - len(keep)} messages on {topic} left out: repeated, "
-                "or without their like on another topic"
-            )
-        columns[topic] = {name: column[keep] for name, column in values.items()}
-    return common * 1e-9, columns
-
-
-def _check_times(path: Path, time: Array, period: float, notes: list[str]) -> None:
-    """Note gaps in time. Raise RigtwinError if the period differs from the recorded one."""
-    steps = np.diff(time)
-    # Stamps may be rounded: their mean says more than any of them, gaps apart.
-    typical = float(np.median(steps)) if len(steps) else period
-    regular = steps[steps < 1.5 * max(typical, period)]
-    spacing = float(np.mean(regular)) if len(regular) else typical
-    off = abs(spacing - period) / period
-    if off > WRONG_PERIOD:
-        raise RigtwinError(
-            f"{path}: its period is said to be {period:g} s, but messages come every "
-            f"{spacing:.4g} s; expected time stamps within {100 * WRONG_PERIOD:g} % of the period"
-        )
-    if off > DOUBTFUL_PERIOD:
-        notes.append(
-            f"messages come every {spacing:.6g} s, {100.0 * off:.2g} % off the period of "
-            f"{period:g} s, which is what ticks are taken for"
-        )
-    gaps = np.nonzero(np.abs(np.diff(time) - period) > 0.5 * period)[0]
-    if len(gaps):
-        notes.append(
-            f"{len(gaps)} gaps in time, "
-            f"the first of {np.diff(time)[gaps[0]]:.4g} s at {time[gaps[0]]:.3f} s"
-        )

@@ -77,6 +77,7 @@ class _Reader(StreamReader):
     """
 
     def _read_record(self, opcode: int, length: int) -> McapRecord | None:
+        # Read, not skipped: the bytes count towards the checksum of the data section.
         if opcode == Opcode.MESSAGE_INDEX:
             self._stream.read(length)
             return None
@@ -121,6 +122,8 @@ def read_records(file: BinaryIO) -> Iterator[McapRecord | Messages | Lost]:
     """
     # A corrupt length must not make the reader allocate more than the file holds.
     size = os.fstat(file.fileno()).st_size
+    # mcap checks the data section's checksum here, and cannot after a resumption, which has not
+    # seen the beginning. Every chunk has a checksum of its own besides.
     reader = _Reader(file, emit_chunks=True, validate_crcs=True, record_size_limit=size)
     known, resumed, begun = 0, -1, False
     while True:
@@ -135,6 +138,7 @@ def read_records(file: BinaryIO) -> Iterator[McapRecord | Messages | Lost]:
                 except DAMAGE:
                     yield Lost(1e-9 * record.message_start_time, 1e-9 * record.message_end_time)
                     continue
+                # After damage the search for a chunk starts behind the last one that was read.
                 known = file.tell()
                 yield from parts
             return
@@ -143,6 +147,8 @@ def read_records(file: BinaryIO) -> Iterator[McapRecord | Messages | Lost]:
             # The first record fails: this is no MCAP file, rather than a damaged one.
             if not begun and isinstance(error, InvalidMagic | struct.error):
                 raise
+            # A start behind the last resumption guarantees progress if the same chunk fails
+            # again.
             yield Lost()
             chunk = _find_chunk(file, max(known, resumed + 1))
             if chunk is None:
@@ -180,12 +186,16 @@ def take_apart(chunk: Chunk) -> list[McapRecord | Messages]:
         begin = at + _PREFIX.size
         at = begin + size
         if at > length:
+            # The length reaches beyond the chunk, which CRC checks let pass only if the writer
+            # was wrong.
             raise EndOfFile()
         if opcode == Opcode.MESSAGE:
             channel, number, logged, published = _MESSAGE.unpack_from(data, begin)
             first = begin - _PREFIX.size
             if channel in seen:
                 # The channel comes again: the pattern is complete, and may repeat from here on.
+                # Bytes from one message of the channel to its next: one turn of all channels
+                # between them.
                 stride = first - seen[channel]
                 seen.clear()
                 passed += 1
@@ -224,9 +234,11 @@ def _take_turns(data: bytes, first: int, stride: int) -> list[Messages]:
     # One row per repetition, seen as bytes without a copy.
     table = np.frombuffer(data, np.uint8, count * stride, first).reshape(count, stride)
     places: list[tuple[int, int, int]] = []
+    # Rows behind the first irregular one are left to the caller, even if they are regular again.
     regular = np.ones(count, dtype=bool)
     at = 0
     while at < stride:
+        # The turn must end exactly with a message; anything else is no pattern.
         if at + _PREFIX.size + _MESSAGE.size > stride:
             return []
         opcode, size = _PREFIX.unpack_from(data, first + at)
@@ -235,6 +247,7 @@ def _take_turns(data: bytes, first: int, stride: int) -> list[Messages]:
         channel = _MESSAGE.unpack_from(data, first + at + _PREFIX.size)[0]
         # Opcode, length and channel are contiguous, so one comparison checks all three.
         head = table[:, at : at + _PREFIX.size + 2]
+        # A quick look at the first rows refuses most false patterns before all rows are compared.
         if not (head[:FEW] == head[0]).all():
             return []
         regular &= (head == head[0]).all(axis=1)
@@ -243,9 +256,13 @@ def _take_turns(data: bytes, first: int, stride: int) -> list[Messages]:
     count = int(np.argmin(regular)) if not regular.all() else count
     messages = []
     for channel, begin, size in places:
+        # Offset 6: channel (2 bytes) and sequence number (4) stand before the 8 bytes of log
+        # time.
         logged = np.ascontiguousarray(table[:count, begin + 6 : begin + 14]).view("<u8")
         content = table[:count, begin + _MESSAGE.size : begin + size].tobytes()
         width = size - _MESSAGE.size
+        # A width of 0 is valid in protobuf: a message with no fields. `range` needs a step above
+        # 0.
         parts = [content[part : part + width] for part in range(0, count * width, width or 1)]
         messages.append(Messages(channel, logged[:, 0].tolist(), parts or [b""] * count))
     return messages
@@ -286,6 +303,7 @@ def seal(values: Mapping[str, str]) -> dict[str, str]:
 
 def unseal(values: Mapping[str, str]) -> tuple[dict[str, str], bool]:
     """Return metadata without their checksum, and whether it is right or absent."""
+    # Other programs write metadata without a checksum, which is not held against them.
     # The checksum covers all entries but itself.
     bare = {name: value for name, value in values.items() if name != _CHECKSUM}
     return bare, values.get(_CHECKSUM, _checksum(bare)) == _checksum(bare)

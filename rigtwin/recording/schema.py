@@ -39,6 +39,7 @@ _DOUBLE_WIRE_TYPE = 1
 
 def type_name(topic: str) -> str:
     """Return the full name of a topic's message type, such as `rigtwin.Command`."""
+    # Protobuf's style: message types in capitals, fields in small letters.
     return "rigtwin." + topic.strip("/").capitalize()
 
 
@@ -52,6 +53,7 @@ def check_names(topic: str, names: Sequence[str]) -> None:
             raise RigtwinError(
                 f"{topic}.{name}: expected a name of letters without accents, digits and _"
             )
+    # Field names that differ in capitals and underscores alone collide there.
     # protobuf's JSON mapping distinguishes fields by their names in camel case.
     seen: dict[str, str] = {}
     for name in names:
@@ -106,6 +108,8 @@ def _segments(count: int) -> Iterator[tuple[slice, np.dtype[np.void], Bytes]]:
     while first <= count:
         # A tag of `length` bytes has 7·length bits, of which three are the wire type.
         last = min(count, (1 << (7 * length - 3)) - 1)
+        # Tag = field number · 8 + wire type; wire type 1 is a 64-bit number in little-endian
+        # order.
         numbers = (np.arange(first, last + 1) << 3) | _DOUBLE_WIRE_TYPE
         parts = numbers[:, None] >> (7 * np.arange(length)) & 0x7F
         parts[:, :-1] |= 0x80
@@ -153,6 +157,7 @@ def decode_rows(block: bytes, messages: int, count: int) -> Array | None:
     """
     segments = list(_segments(count))
     width = sum(len(tags) * layout.itemsize for _, layout, tags in segments)
+    # Fields at their default that another writer omitted also make a block shorter.
     if len(block) != messages * width:
         return _decode_wrapped(block, messages, count)
     rows = np.frombuffer(block, np.uint8).reshape(messages, width)

@@ -155,6 +155,18 @@ class Writer:
         self._channels: list[Channel] = []
         self._chunks: list[ChunkIndex] = []
         self._metadata: list[MetadataIndex] = []
+        # MCAP: magic bytes, header, data section, summary section, footer, magic bytes.
+        self._put_head(experiment, period, controller, machine, description)
+
+    def _put_head(
+        self,
+        experiment: str,
+        period: float,
+        controller: Mapping[str, object],
+        machine: str,
+        description: Path | None,
+    ) -> None:
+        """Write what stands before the first tick: the format, and what the test is."""
         self._put(MCAP0_MAGIC + _encode(Header(profile="", library="rigtwin")))
         # The controller's settings are what its operator knows; hidden effects are not stored here.
         config = json.dumps({"controller": controller})
@@ -166,7 +178,7 @@ class Writer:
                 "experiment": experiment,
                 "period": repr(period),
                 "config": config,
-                **description_values(path, description),
+                **description_values(self._path, description),
             },
         )
 
@@ -188,6 +200,7 @@ class Writer:
         Metadata that fit are then written there.
         """
         place = self._offset
+        # An ordinary metadata record, so that every MCAP reader passes over it.
         self.add_metadata(_RESERVE, {"": " " * _RESERVED})
         self._room = (place, self._offset)
 
@@ -195,6 +208,7 @@ class Writer:
         """Add a metadata record now."""
         record = _encode(Metadata(name=name, metadata=seal(values)))
         if self._full:
+            # Not in the metadata index, which a full disk cannot hold anyway.
             self._put_into_room(record)
             return
         self._metadata.append(MetadataIndex(offset=self._offset, length=len(record), name=name))
@@ -243,6 +257,8 @@ class Writer:
         if topic not in self._topics:
             self._register(topic)
         if len(values):
+            # MCAP times are unsigned, so messages before the test's start have time 0; the true
+            # time is in their first field.
             stamps = np.round(np.maximum(times, 0.0) * 1e9).astype(np.uint64)
             self._put_messages(
                 {topic: values}, stamps, np.arange(len(values)) + self._counts.get(topic, 0)
@@ -264,6 +280,7 @@ class Writer:
                 for topic, rows in encoded.items()
             ]
         )
+        # A dtype made of a list has no padding, so the array's bytes are the records themselves.
         messages = np.zeros(ticks, layout)
         for topic, rows in encoded.items():
             message = messages[topic]
@@ -287,6 +304,7 @@ class Writer:
         self.add_metadata(END_RECORD, {"reason": reason, "ticks": str(self._ticks)})
         # A checksum of 0 means none: each chunk has its own.
         self._put(_encode(DataEnd(data_section_crc=0)))
+        # Offsets in the footer count from the file's start; the summary begins here.
         start = self._offset
         # The summary lets readers find channels and chunks without reading the whole file.
         summary = bytearray()
@@ -391,6 +409,7 @@ class Writer:
         try:
             # An unbuffered write may be partial without an error.
             written = self._file.write(data)
+            # The kernel writes what fits before it reports a full disk in the next call.
             if written != len(data):
                 raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         except OSError as error:
@@ -406,6 +425,7 @@ class Writer:
             self._file.close()
             return
         self._full = True
+        # A part of a record at the end would count as damage; the space before it is reserved.
         with suppress(OSError):
             self._file.truncate(self._offset)
 
@@ -413,6 +433,7 @@ class Writer:
         """Overwrite the reserved space, which needs no free disk, and keep its remainder."""
         assert self._room is not None
         place, end = self._room
+        # What remains must hold the head of another reserve record, so that readers find no gap.
         rest = end - place - len(record) - len(_encode(Metadata(name=_RESERVE, metadata={"": ""})))
         # The reserved space is used up; the record is lost, but the rig must still be stopped.
         if rest < 0:

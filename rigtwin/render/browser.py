@@ -130,6 +130,7 @@ def _laid_out(path: Path, page: str) -> tempfile.TemporaryDirectory[str]:
         )
     except OSError as error:
         raise RigtwinError(f"cannot write {path}: {error.strerror}") from None
+    # Once only: a page may quote <head> in its text.
     atomic_write(Path(folder.name, "page.html"), page.replace("<head>", "<head>" + HEAD, 1))
     return folder
 

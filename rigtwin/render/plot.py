@@ -236,6 +236,7 @@ def _figure(recording: Recording, ticks: slice, style: Style, panels: Sequence[s
         figsize=(style.width, style.panel * len(shown) + style.rest), layout="constrained"
     )
     FigureCanvasAgg(figure)
+    # One time axis for all, so that zooming and gaps line up.
     axes = figure.subplots(len(shown), 1, sharex=True, squeeze=False)[:, 0]
     for axis, (title, traces) in zip(axes, shown, strict=True):
         for trace in traces:
@@ -262,6 +263,7 @@ def _figure(recording: Recording, ticks: slice, style: Style, panels: Sequence[s
             ncols=2,
             borderpad=0.1,
         )
+        # Time fills the width: a margin would look like missing data.
         axis.margins(x=0)
     # Titles of the panels share one vertical line whatever their numbers' width.
     figure.align_ylabels(axes)

@@ -38,9 +38,8 @@ BEAM_COLOUR = np.array([0.82, 0.38, 0.24, 1.0], np.float32)
 GHOST_COLOUR = np.array([0.92, 0.43, 0.08, 0.4], np.float32)
 """Colour of the twin's prediction, the same as on the page of a look."""
 NO_RENDERING = (
-    "cannot render without a display; on Debian or Ubuntu: "
-    "sudo apt-get install libegl1 libgl1 libgl1-mesa-dri, "
-    "elsewhere install EGL or OSMesa and set MUJOCO_GL=egl or osmesa"
+    "cannot render without a display; on Debian or Ubuntu: sudo apt-get install libegl1 libgl1 "
+    "libgl1-mesa-dri, elsewhere install EGL or OSMesa and set MUJOCO_GL=egl or osmesa"
 )
 
 
@@ -96,30 +95,38 @@ def film(
     traces = _Traces(machine.physics.curves(machine, recording), recording.time, ticks)
     beams = machine.physics.deflection(recording)
     bent = None if beams is None else magnify * beams[ticks]
-    # Frames have equal distances in time; each shows the next recorded tick.
+    frames = _list_frames(time)
+    with _renderer(machine, camera) as render, _open_video(out) as put:
+        for number, tick in enumerate(frames):
+            at = {name: float(values[tick]) for name, values in motions.items()}
+            twin = {name: float(values[tick]) for name, values in ghosts.items()}
+            scene = render(at, None if bent is None else bent[tick], twin)
+            put(np.vstack([scene, traces.at(float(time[tick]))]))
+            if progress is not None:
+                progress(number + 1, len(frames))
+
+
+def _list_frames(time: Array) -> NDArray[np.intp]:
+    """Return the tick that each frame shows: the next one recorded, at equal distances in time."""
     shown = np.searchsorted(time, np.arange(time[0], time[-1], 1.0 / FRAMES_PER_SECOND))
     # Rounding may place the last frame behind the end.
-    frames = np.minimum(shown, len(time) - 1)
+    return np.minimum(shown, len(time) - 1)
+
+
+@contextmanager
+def _open_video(out: Path) -> Iterator[Callable[[Image], object]]:
+    """Provide a function that adds a picture to a video file, which is complete or not there."""
     # The video grows under another name; a failure must not leave half a file.
     temporary = out.with_name(f".{os.getpid()}.{out.name[-100:]}.part")
     try:
-        with (
-            _renderer(machine, camera) as render,
-            av.open(str(temporary), "w", format="mp4") as container,
-        ):
+        with av.open(str(temporary), "w", format="mp4") as container:
             stream = _add_stream(container)
-            for number, tick in enumerate(frames):
-                at = {name: float(values[tick]) for name, values in motions.items()}
-                twin = {name: float(values[tick]) for name, values in ghosts.items()}
-                scene = render(at, None if bent is None else bent[tick], twin)
-                picture = np.vstack([scene, traces.at(float(time[tick]))])
-                container.mux(
-                    stream.encode(
-                        av.VideoFrame.from_ndarray(np.ascontiguousarray(picture), format="rgb24")
-                    )
-                )
-                if progress is not None:
-                    progress(number + 1, len(frames))
+
+            def put(picture: Image) -> None:
+                frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(picture), format="rgb24")
+                container.mux(stream.encode(frame))
+
+            yield put
             # Encoding nothing flushes the frames that the encoder has delayed.
             container.mux(stream.encode())
         temporary.replace(out)
@@ -189,6 +196,7 @@ def _renderer(
     # The context must be current before MuJoCo uploads its textures and meshes.
     data = mujoco.MjData(model)
     context = _context()
+    # MuJoCo allocates the offscreen buffer at this size, 640 x 480 by default.
     model.vis.global_.offwidth, model.vis.global_.offheight = WIDTH, SCENE_HEIGHT
     drawing = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_150)
     mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, drawing)

@@ -162,5 +162,7 @@ class Actuators:
         # The controller is still updated, because its filters are part of the observation. Its
         # commands are discarded.
         state, _ = update(controlling, state, measured, demand)
+        # No force is demanded here. The measured one takes its place, so that the force error is
+        # zero.
         structure, voltage = action.tolist()
         return state, Commands(demand.ground, structure, measured.load_cell, voltage)

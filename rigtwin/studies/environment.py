@@ -93,6 +93,7 @@ class Task(NamedTuple):
 
 
 def _task(seed: int) -> Task:
+    # A stream apart from the twin's: noise on actions must not change the road or the sensors.
     return Task(np.random.default_rng([seed, ACTION_NOISE]))
 
 
@@ -166,6 +167,7 @@ class Environment(dm_env.Environment):
         # The static force of the tyre is the body's weight; the reward counts deviations from it.
         self._static = configuration.controller.sprung_mass * configuration.controller.gravity
         # Static deflection of the suspension spring under the body's weight.
+        # Travel at rest = (preload − weight) / stiffness, about which the reward measures.
         self._sag = (configuration.controller.preload - self._static) / max(
             configuration.controller.suspension_stiffness, 1e-9
         )
@@ -244,6 +246,7 @@ class Environment(dm_env.Environment):
             else self._twin
         )
         self._next_seed += 1
+        # The controller starts afresh in each episode, as a session on the rig does.
         self._state, self._memory = initial_state(self._controlling), empty_memory()
         self._tick, self._over, self.trip = 0, False, Trip.NONE
         start = self.configuration.controller.start
@@ -330,6 +333,7 @@ class Environment(dm_env.Environment):
 
     def _cost(self, true: Measurements) -> float:
         period = self.configuration.timing.period
+        # Three positions suffice for a second difference.
         self._plate = [*self._plate[-2:], true.structure_lvdt]
         # Second central difference of the plate's position: no acceleration is simulated for the
         # plate, whose motion is prescribed.

@@ -81,9 +81,7 @@ class _OutOfTime(Exception):
 
 
 def find_identifiable(
-    machine: Machine,
-    seconds: float = math.inf,
-    progress: Callable[[str], object] = lambda _: None,
+    machine: Machine, seconds: float = math.inf, progress: Callable[[str], object] = lambda _: None
 ) -> Identifiability:
     """Return which effects of a machine its sensors can identify.
 
@@ -122,13 +120,26 @@ def find_identifiable(
             progress(f"{effect.name}, {number} of {len(searched)}")
             responses[effect.name] = trial.response(effect)
     except _OutOfTime:
-        untried = tuple(each.name for each in searched if each.name not in responses)
+        remaining = tuple(effect.name for effect in searched if effect.name not in responses)
         unseen = tuple(name for name, shape in responses.items() if shape is None)
         seen = tuple(name for name, shape in responses.items() if shape is not None)
-        return Identifiability((), unseen, {}, motions, sums, (*seen, *untried))
+        return Identifiability((), unseen, {}, motions, sums, (*seen, *remaining))
     unseen = tuple(name for name, shape in responses.items() if shape is None)
     shapes = {name: shape for name, shape in responses.items() if shape is not None}
-    effects = {each.name: each for each in searched if each.name in shapes}
+    effects = {effect.name: effect for effect in searched if effect.name in shapes}
+    confounded, untried = _find_confounded(trial, effects, shapes, progress)
+    known = {*unseen, *confounded, *untried}
+    seen = tuple(name for name in responses if name not in known)
+    return Identifiability(seen, unseen, confounded, motions, sums, untried)
+
+
+def _find_confounded(
+    trial: _Trial,
+    effects: Mapping[str, Effect],
+    shapes: Mapping[str, Array],
+    progress: Callable[[str], object],
+) -> tuple[dict[str, tuple[str, ...]], tuple[str, ...]]:
+    """Return the combination that reproduces each confounded effect, and the effects untried."""
     confounded: dict[str, tuple[str, ...]] = {}
     untried: tuple[str, ...] = ()
     for number, (name, shape) in enumerate(shapes.items(), 1):
@@ -141,9 +152,7 @@ def find_identifiable(
                     break
         except _OutOfTime:
             untried = (*untried, name)
-    known = {*unseen, *confounded, *untried}
-    seen = tuple(name for name in responses if name not in known)
-    return Identifiability(seen, unseen, confounded, motions, sums, untried)
+    return confounded, untried
 
 
 class _Trial:
@@ -209,6 +218,8 @@ class _Trial:
         nominal = tuple(effect.nominal(self.plant).values())
         starts = self._starts(effect)
         sizes = sorted(starts.values, key=lambda values: abs(values[0] - nominal[0]))
+        # Only the first parameter is made small; the others keep the values of the smallest
+        # start, as an effect may need them to act at all.
         little = (nominal[0] + starts.steps[0], *sizes[0][1:])
         for values in (little, *sizes):
             if values == nominal:
@@ -241,6 +252,7 @@ class _Trial:
             return np.ravel(target - self._predict(with_values(self.plant, combination, values)))
 
         start = np.ones(len(combination))
+        # diff_step is relative to the start at 1, so one step is one of the effects' own steps.
         fit = least_squares(residual, start, diff_step=1.0, max_nfev=EVALUATIONS)
         return change > 0.0 and float(np.linalg.norm(fit.fun)) < UNEXPLAINED * change
 
@@ -262,6 +274,8 @@ def _propose(shape: Array, rivals: Mapping[str, Array]) -> Iterator[tuple[str, .
     gram, shared = columns @ columns.T, columns @ shape
 
     def residual(chosen: list[int]) -> float:
+        # For unit vectors: ‖shape − projection‖² = 1 − tᵀ G⁻¹ t with the Gram matrix G of the
+        # chosen.
         part, target = gram[np.ix_(chosen, chosen)], shared[chosen]
         return 1.0 - float(target @ np.linalg.lstsq(part, target, rcond=RANK)[0])
 

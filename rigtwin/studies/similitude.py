@@ -56,10 +56,9 @@ def dimension(unit: str) -> Dimension:
         If the unit contains an unknown symbol; the message lists the known ones.
     """
     plain = re.sub(
-        r"[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+",
-        lambda raised: "^" + raised[0].translate(_RAISED),
-        unit.strip(),
+        r"[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+", lambda raised: "^" + raised[0].translate(_RAISED), unit.strip()
     )
+    # Several slashes divide in turn: m/s/s is m/s².
     above, *below = plain.split("/")
     total = [0, 0, 0]
     for sign, product in ((1, above), *((-1, _denominator(part, unit)) for part in below)):
@@ -86,7 +85,7 @@ def _symbols(factor: str, unit: str) -> list[tuple[str, str]]:
     if not re.fullmatch(f"(?:{_SYMBOL.pattern})+", factor) or _PREFIXED.match(factor):
         known = ", ".join(_SYMBOLS)
         raise RigtwinError(
-            f"unknown unit {unit!r}; expected {known}, without prefixes, as in Ns/m or m/s^2",
+            f"unknown unit {unit!r}; expected {known}, without prefixes, as in Ns/m or m/s^2"
         )
     return _SYMBOL.findall(factor)
 
@@ -109,7 +108,7 @@ class Group:
             if values[name] == 0.0 and exponent < 0:
                 raise RigtwinError(
                     f"{name} is 0 and in the denominator of {self}; "
-                    "choose another repeating quantity",
+                    "choose another repeating quantity"
                 )
         return math.prod(values[name] ** exponent for name, exponent in self.exponents.items())
 
@@ -154,7 +153,7 @@ def pi_groups(units: Units, repeating: Sequence[str] = ()) -> tuple[Group, ...]:
         # Multiply by the least common denominator to get integer powers.
         multiple = math.lcm(*(power.denominator for power in powers.values()))
         groups.append(
-            Group({name: int(power * multiple) for name, power in powers.items() if power}),
+            Group({name: int(power * multiple) for name, power in powers.items() if power})
         )
     return tuple(groups)
 
@@ -197,19 +196,17 @@ def scaling(units: Units, scales: Mapping[str, float]) -> Scaling:
         raise RigtwinError(f"scales: expected the factors of three quantities, got {count}")
     for name, scale in scales.items():
         if not (math.isfinite(scale) and scale > 0.0):
-            raise RigtwinError(
-                f"scale of {name} = {scale:g}: expected a positive, finite factor",
-            )
+            raise RigtwinError(f"scale of {name} = {scale:g}: expected a positive, finite factor")
     # Inverting the dimension matrix A beside the identity gives log λ = A⁻¹ log(factors).
     identity = [[Fraction(int(row == column)) for column in range(3)] for row in range(3)]
     rows, pivots = _reduce(
-        [row + unit for row, unit in zip(_dimensions(names, units), identity, strict=True)],
+        [row + unit for row, unit in zip(_dimensions(names, units), identity, strict=True)]
     )
     if pivots != [0, 1, 2]:
         group = pi_groups({name: units[name] for name in names})[0]
         raise RigtwinError(
             f"{', '.join(names)} are dimensionally dependent: {group} has no unit; "
-            "expected independent quantities",
+            "expected independent quantities"
         )
     factors = tuple(scales.values())
     powers = [[float(row[3 + base]) for row in rows] for base in range(3)]
@@ -227,9 +224,7 @@ def scale_values(values: Mapping[str, float], units: Units, scaling: Scaling) ->
 
 
 def largest_change(
-    units: Units,
-    original: Mapping[str, float],
-    changed: Mapping[str, float],
+    units: Units, original: Mapping[str, float], changed: Mapping[str, float]
 ) -> float:
     """Return the largest relative change of a Pi group from one system to another.
 
@@ -245,6 +240,7 @@ def largest_change(
     # Logarithms avoid overflow: a group can contain large powers.
     logarithms = []
     for group in groups:
+        # fsum rounds once, so that the logarithms of a true scaling cancel to zero.
         powers = group.exponents.items()
         logarithms.append(math.fsum(power * math.log(ratios[name]) for name, power in powers))
     # exp(700) is about the largest double.

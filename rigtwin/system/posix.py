@@ -37,6 +37,7 @@ RESOLUTION = time.get_clock_info("monotonic").resolution
 
 def lock_file(handle: int) -> None:
     """Lock a file for as long as it is open. Raise OSError if another program has locked it."""
+    # flock belongs to the open file, and ends with it, also when the program is killed.
     fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
@@ -49,6 +50,7 @@ def no_interrupts() -> Iterator[None]:
     try:
         yield
     finally:
+        # A process inherits the signal mask of the thread that starts it.
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
@@ -66,11 +68,13 @@ def read_keys() -> Iterator[Callable[[], bool] | None]:
         return
     before = termios.tcgetattr(terminal)
     # Without canonical mode a key arrives without Enter.
+    # Cbreak rather than raw mode: Ctrl-C must still send its signal.
     tty.setcbreak(terminal)
 
     def pressed() -> bool:
         if not select.select([sys.stdin], [], [], 0.0)[0]:
             return False
+        # Consumed, so that the shell does not get the key after the test.
         sys.stdin.read(1)
         return True
 
@@ -82,6 +86,7 @@ def read_keys() -> Iterator[Callable[[], bool] | None]:
 
 def leave_terminal() -> None:
     """Detach from the terminal, so that Ctrl-C, Ctrl-Z and hang-up do not reach this process."""
+    # setsid refuses the leader of a process group; the signals are ignored in any case.
     with suppress(OSError):
         os.setsid()
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT):

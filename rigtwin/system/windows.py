@@ -25,13 +25,13 @@ STOP_SIGNALS: tuple[int, ...] = tuple(
     if hasattr(signal, name)
 )
 RENDERER = "glfw"
-_NORMAL, _HIGH, _REALTIME = 0x20, 0x80, 0x100
-"""NORMAL_, HIGH_ and REALTIME_PRIORITY_CLASS."""
+_NORMAL, _REALTIME = 0x20, 0x100
+"""NORMAL_ and REALTIME_PRIORITY_CLASS."""
 _USUAL, _CRITICAL = 0, 15
 """THREAD_PRIORITY_NORMAL and _TIME_CRITICAL."""
 _SYNCHRONIZE, _TERMINATE = 0x0010_0000, 0x0001
-_ENDED, _RUNS = 0x0, 0x102
-"""WAIT_OBJECT_0 and WAIT_TIMEOUT."""
+_ENDED = 0x0
+"""WAIT_OBJECT_0."""
 _GRAIN = 1
 """Finest resolution of the system's timers that can be requested, in ms."""
 
@@ -44,6 +44,7 @@ RESOLUTION = time.get_clock_info("perf_counter").resolution
 def _library(name: str) -> Any:
     """Return a system library that passes 64-bit handles unchanged."""
     library = getattr(ctypes, "WinDLL")(name, use_last_error=True)  # noqa: B009 - of Windows alone
+    # By default ctypes takes results for 32-bit integers, and would cut off a handle.
     for call in ("GetCurrentProcess", "GetCurrentThread", "OpenProcess"):
         if name == "kernel32":
             getattr(library, call).restype = ctypes.c_void_p
@@ -67,6 +68,7 @@ def lock_file(handle: int) -> None:
     """
     msvcrt = import_module("msvcrt")
     os.lseek(handle, 1 << 30, os.SEEK_SET)
+    # _locking starts at the file position, which is therefore set beyond the end and reset.
     try:
         msvcrt.locking(handle, msvcrt.LK_NBLCK, 1)
     finally:

@@ -39,6 +39,7 @@ class Cusum:
         """
         # log p₁/p₀ of n normal squares with variances 1 and R: ½ (1 − 1/R) Σx² − ½ n log R.
         step = 0.5 * (1.0 - 1.0 / RATIO) * power - 0.5 * count * math.log(RATIO)
+        # Page's reset at zero: a long quiet time earns no credit against a later change.
         self.value = max(self.value + step, 0.0)
         # The last time at zero is the estimate of when the change began.
         if self.value == 0.0:

@@ -99,8 +99,11 @@ def _powers(lines: Lines, residual: Array) -> Array:
     The spectrum is cut into bands, and each band is transformed back to a signal over time.
     """
     rows, ticks = lines.measured.shape
+    # Evidence keeps real and imaginary parts one after the other, since least squares are real.
     real, imaginary = residual.reshape(2, rows, len(lines.frequency))
     whole = np.zeros((rows, len(BANDS), lines.length // 2 + 1), complex)
+    # The bands are disjoint: by Parseval's theorem their powers, summed over time, add up to the
+    # total.
     whole[:, :, : real.shape[1]] = (real + 1j * imaginary)[:, None, :] * _in_bands(lines)
     # Real and imaginary parts of a line have variance 1 only if all ticks count.
     share = np.sum(lines.fade**2, axis=1) / lines.length

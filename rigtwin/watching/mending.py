@@ -46,6 +46,7 @@ def mend(recording: Recording) -> tuple[Recording, NDArray[np.bool_]]:
     before = np.searchsorted(places, ticks, side="right") - 1
     columns = {
         topic: {
+            # The card held its last command; sensors went on moving.
             name: values[before] if topic == "/command" else np.interp(ticks, places, values)
             for name, values in names.items()
         }

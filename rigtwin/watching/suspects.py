@@ -56,12 +56,16 @@ def find_suspects(evidence: Evidence, thresholds: Thresholds = STANDARD) -> tupl
     # misfit prove less, and the weights exp(−χ²/2) are tempered.
     remaining = max(min(fit.misfit for fit in fits) - evidence.expected, 0.0)
     temper = thresholds.temper + TEMPERED * remaining
+    # Bounded by exp(−700), which is still a double above 0.
     weights = np.exp(-np.minimum((costs - costs.min()) / (2.0 * temper), 700.0))
     weights /= weights.sum()
     gap = max(without.misfit - evidence.expected, 1e-300)
     suspects = [
         _suspect(
-            fit, (without.misfit - fit.misfit) / gap, thresholds.highest_confidence * float(weight)
+            # No probability is certain: causes outside the library have a share too.
+            fit,
+            (without.misfit - fit.misfit) / gap,
+            thresholds.highest_confidence * float(weight),
         )
         for fit, weight in zip(fits, weights, strict=True)
     ]

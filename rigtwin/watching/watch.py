@@ -130,6 +130,7 @@ class Watch:
         self.recording, self.gap = window, find_gap(evidence)
         gap = self.gap
         # At the end of a test nothing follows, so everything is judged.
+        # A model with an infinite band has no filter, so nothing has to wait.
         held = 0.0 if last or math.isinf(evidence.models[0].band) else HELD_BACK
         first, stop = np.searchsorted(gap.time, [self.judged, end - held])
         new = slice(int(first), max(int(stop), int(first)))
@@ -179,7 +180,9 @@ class Watch:
             # A diverged twin predicts infinities, whose difference is NaN and never converges.
             with np.errstate(invalid="ignore"):
                 difference = np.abs(kicked.predict(plant) - predicted)
+            # A tick counts only if all signals have converged, as they act on each other.
             converged = np.all(difference <= SAME * np.array(held)[:, None], axis=0)
+            # The model may predict every n-th tick only.
             known &= np.repeat(converged, model.every)[: window.ticks]
         return known
 
@@ -232,6 +235,7 @@ class Watch:
         self._looked = seen
         # The twin needs the time before the gap to settle.
         part = window.between(since - WARM, math.inf)
+        # A gap since the test's first tick has no onset within it.
         from_here = part.time >= (since + SETTLED if since > self._start else since)
         try:
             suspects = find_suspects(self._evidence(part, recorded[-part.ticks :] & from_here))

@@ -93,6 +93,8 @@ def set_zeros(
     ChannelTable
         Table with new offsets.
     """
+    # Value = factor · volts + offset: a reading that is wrong by the same amount everywhere is
+    # corrected in the offset alone, whatever the span.
     lines = [
         _rescale(line, offset=line.scaling.offset - signal.mean + references.get(line.name, 0.0))
         for line, signal in zip(table.inputs, still, strict=True)
@@ -123,10 +125,8 @@ def set_spans(
     for line, signal in zip(table.inputs, still, strict=True):
         if line.name in references:
             # value = factor · volts + offset: the span scales only the part without the offset.
-            moved, wanted = (
-                signal.mean - line.scaling.offset,
-                references[line.name] - line.scaling.offset,
-            )
+            moved = signal.mean - line.scaling.offset
+            wanted = references[line.name] - line.scaling.offset
             # Near zero the span is a quotient of two small numbers.
             if abs(moved) < 10.0 * signal.noise:
                 raise RigtwinError(
@@ -262,6 +262,8 @@ def correct_signs(
                 f"sign of {sensor}: it hardly answers (gain {gain:.2g} ± {error:.1g}); "
                 "is it connected, has the rig pressure?"
             )
+        # The travel is no output of its own: it follows the structure, so the operator judged
+        # that motion.
         driven = "structure" if output == "travel" else output
         went = moved[driven]
         if output in outputs:

@@ -5,14 +5,14 @@ The card is driven by this computer's driver or by a gRPC device server.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq.conversion import conversion, rows
+from rigtwin.hardware.daq.driver import CardFault, translate_errors
 from rigtwin.hardware.daq.table import ChannelTable
 from rigtwin.hardware.realtime import Pacer
 from rigtwin.system import monotonic
@@ -22,71 +22,8 @@ if TYPE_CHECKING:
 
 TIMEOUT = 0.1
 """Maximum time to wait for a sample, in s. A card that is silent for longer is considered gone."""
-DRIVER = (
-    "install NI-DAQmx from ni.com, or name a gRPC device server in the channel table: card.address"
-)
-PACKAGE = "the nidaqmx package is missing; pip install 'rigtwin[daq]'"
 INPUTS, OUTPUTS, PRESSURE = "rigtwin-inputs", "rigtwin-outputs", "rigtwin-pressure"
 """Names of the tasks. A guardian finds the outputs by them after their owner has died."""
-
-
-class CardFault(RigtwinError):
-    """Error for a card, driver or connection that does not do what it was asked."""
-
-
-@contextmanager
-def translate_errors(doing: str) -> Iterator[None]:
-    """Raise errors of nidaqmx as a CardFault with a message of one line."""
-    from nidaqmx.errors import DaqNotFoundError, DaqNotSupportedError, Error, RpcError
-
-    try:
-        yield
-    except (DaqNotFoundError, DaqNotSupportedError):
-        raise CardFault(f"the NI-DAQmx driver is missing on this computer; {DRIVER}") from None
-    except RpcError as error:
-        raise CardFault(f"{doing}: {str(error).splitlines()[0]}") from None
-    except Error as error:
-        lines = [line.strip() for line in str(error).splitlines() if line.strip()]
-        raise CardFault(f"{doing}: {' '.join(lines[:4])}") from None
-    except (AssertionError, ValueError, TypeError) as error:
-        # nidaqmx raises these from its own checks of a card's answer.
-        raise CardFault(
-            f"{doing}: unexpected answer of the card, which the driver's client rejects: "
-            f"{error or type(error).__name__}"
-        ) from None
-
-
-def require_client() -> None:
-    """Raise CardFault unless the driver's client and the virtual card's packages are installed."""
-    try:
-        import grpc  # noqa: F401
-        import nidaqmx  # noqa: F401
-    except ImportError:
-        raise CardFault(PACKAGE) from None
-
-
-def connect(address: str) -> grpc.Channel | None:
-    """Return the connection to a gRPC device server, or None for this computer's driver.
-
-    Raises
-    ------
-    CardFault
-        If the client is not installed.
-    """
-    require_client()
-    if not address:
-        return None
-    import grpc
-
-    # The client's calls have no timeout of their own. Keepalive pings end a call to a server that
-    # is frozen, or whose network is gone.
-    alive = (
-        ("grpc.keepalive_time_ms", 1000),
-        ("grpc.keepalive_timeout_ms", 1000),
-        ("grpc.http2.max_pings_without_data", 0),
-    )
-    # The server is on the laboratory's own network; NI's server has no encryption by default.
-    return grpc.insecure_channel(address, options=alive)
 
 
 class Card:
@@ -128,10 +65,8 @@ class Card:
         """
         self._table, self._period, self._channel = table, period, channel
         # A tick converts a few numbers: passing them to compiled code would take longer.
-        self._inputs, self._outputs = (
-            rows(conversion(table.inputs)),
-            rows(conversion(table.outputs)),
-        )
+        self._inputs = rows(conversion(table.inputs))
+        self._outputs = rows(conversion(table.outputs))
         self._volts, self._asked = np.zeros(len(table.inputs)), np.zeros(len(table.outputs))
         self._signals = table.signals
         self._pacer, self._clock = pacer, clock
@@ -211,20 +146,16 @@ class Card:
                 inputs.timing.cfg_samp_clk_timing(
                     1.0 / self._period, sample_mode=AcquisitionType.CONTINUOUS, samps_per_chan=1000
                 )
-            self._reader, self._writer = (
-                AnalogMultiChannelReader(inputs.in_stream),
-                AnalogMultiChannelWriter(outputs.out_stream),
-            )
+            self._reader = AnalogMultiChannelReader(inputs.in_stream)
+            self._writer = AnalogMultiChannelWriter(outputs.out_stream)
             # Shapes are right by construction; checking them costs microseconds in every tick.
             self._reader.verify_array_shape = self._writer.verify_array_shape = False
             self._writer.auto_start = False
             # Outputs first: once samples arrive, the loop must be able to answer them.
             for task in (outputs, pressure, inputs):
                 task.start()
-            self._stream, self._power = (
-                inputs.in_stream,
-                DigitalSingleChannelWriter(pressure.out_stream),
-            )
+            self._stream = inputs.in_stream
+            self._power = DigitalSingleChannelWriter(pressure.out_stream)
             self._power.auto_start = False
 
     def read(self) -> tuple[float, ...]:
@@ -234,6 +165,7 @@ class Card:
             self.missed, self.late = self._pacer.wait(), self._pacer.late
         try:
             self._reader.read_one_sample(self._volts, TIMEOUT)  # type: ignore[arg-type]
+            # A paced card has no buffer: each read converts at the moment of the call.
             if self._pacer is None:
                 self._drop_old_samples()
         except Exception as error:
@@ -251,6 +183,7 @@ class Card:
         if self._start < 0.0:
             self._start = now
         self.late = now - (self._start + self._count * self._period)
+        # Less than half a period is jitter of the two clocks, not a sample that waits.
         if self.late > 0.5 * self._period:
             # Samples count as missed only if the card has them: the computer's clock may be off.
             self.missed = self._stream.avail_samp_per_chan
@@ -296,6 +229,8 @@ class Card:
         """
         # Without all three tasks the card was never started, and has nothing to stop.
         if len(self._tasks) == 3:
+            # Zero force is the voltage that the table's offset assigns to it, which need not be 0
+            # V.
             zeros = self._to_volts([0.0] * len(self._outputs))
             for place in self._signals.released_places:
                 self._asked[place] = zeros[place]

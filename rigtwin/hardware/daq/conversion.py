@@ -57,6 +57,7 @@ def rows(lines: Conversion) -> list[tuple[float, float, float]]:
 @compilable
 def volts_of(lines: Conversion, values: Array, out: Array) -> None:
     """Convert values to voltages, both of shape (lines,), clipped to the lines' ranges."""
+    # An explicit loop, because an array expression would allocate memory in every tick.
     for line in range(len(out)):
         volts = (values[line] - lines.offset[line]) / lines.factor[line]
         out[line] = min(max(volts, -lines.range[line]), lines.range[line])
@@ -74,6 +75,8 @@ def digitise(lines: Conversion, volts: Array, out: Array) -> None:
     """Round voltages, shape (lines,), to the codes of a 16-bit converter."""
     for line in range(len(out)):
         bit = 2.0 * lines.range[line] / CODES
+        # Rounding to the nearest code is what an ideal converter does: its error is uniform
+        # within ± half a code.
         # Two's complement: the most positive code is one step short of the range.
         code = min(max(float(np.rint(volts[line] / bit)), -CODES / 2.0), CODES / 2.0 - 1.0)
         out[line] = bit * code

@@ -8,15 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from rigtwin.hardware.daq.card import (
-    INPUTS,
-    OUTPUTS,
-    PRESSURE,
-    CardFault,
-    connect,
-    translate_errors,
-)
+from rigtwin.hardware.daq.card import INPUTS, OUTPUTS, PRESSURE
 from rigtwin.hardware.daq.conversion import conversion, to_volts
+from rigtwin.hardware.daq.driver import CardFault, connect, translate_errors
 from rigtwin.hardware.daq.table import ChannelTable
 from rigtwin.numerics.arrays import Array
 
@@ -63,6 +57,8 @@ class FailsafeOutputs:
         self._values[:] = outputs
         to_volts(self._conversion, self._values, self._volts)
         with translate_errors(f"card {self._table.device}: stopping it"):
+            # A driver on this computer frees the owner's lines at its death, so only now can they
+            # be reserved.
             if self._outputs is None:
                 self._take()
             assert self._outputs is not None
@@ -90,11 +86,11 @@ class FailsafeOutputs:
         from nidaqmx import Task
         from nidaqmx.grpc_session_options import GrpcSessionOptions, SessionInitializationBehavior
 
-        channel, attach = (
-            connect(self._table.address),
-            SessionInitializationBehavior.ATTACH_TO_SERVER_SESSION,
-        )
+        channel = connect(self._table.address)
+        attach = SessionInitializationBehavior.ATTACH_TO_SERVER_SESSION
         assert channel is not None
+        # The writers take the first two by their place. The inputs are attached so that `close`
+        # also ends the owner's acquisition.
         for name in (OUTPUTS, PRESSURE, INPUTS):
             options = GrpcSessionOptions(channel, name, initialization_behavior=attach)
             self._tasks.append(Task(name, grpc_options=options))

@@ -8,13 +8,7 @@ from controllers import Measurements
 from controllers.compiled import compilable
 from rigtwin.components import RigPlant
 from rigtwin.description.configuration import Configuration
-from rigtwin.hardware.daq.conversion import (
-    Conversion,
-    conversion,
-    digitise,
-    values_of,
-    volts_of,
-)
+from rigtwin.hardware.daq.conversion import Conversion, conversion, digitise, values_of, volts_of
 from rigtwin.hardware.daq.table import ChannelTable
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel

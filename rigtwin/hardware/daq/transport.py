@@ -144,6 +144,8 @@ def serve(card: VirtualCard, port: int) -> tuple[grpc.Server, int]:
     # A refused call is an answer to the client, not an error of the server.
     logging.getLogger("grpc").setLevel(logging.CRITICAL)
     server = grpc.server(
+        # A read occupies its thread until the sample exists; others must be free to answer
+        # writes.
         ThreadPoolExecutor(max_workers=8),
         handlers=[_CallHandler(card)],
         # Without this, Linux lets two servers share a port, and calls reach either of them.

@@ -90,13 +90,11 @@ class _Task:
     """Task of the driver; `next` is the tick of the sample it reads next."""
 
     def __init__(self, name: str) -> None:
-        self.name, self.lines, self.clocked, self.running, self.next = (
-            name,
-            list[str](),
-            False,
-            False,
-            0,
-        )
+        self.name = name
+        self.lines = list[str]()
+        self.clocked = False
+        self.running = False
+        self.next = 0
 
 
 class VirtualCard:
@@ -123,18 +121,13 @@ class VirtualCard:
         State of the digital line.
     """
 
-    def __init__(
-        self,
-        terminals: Wired,
-        wiring: ChannelTable,
-        time: OnDemand | RealTime,
-    ) -> None:
+    def __init__(self, terminals: Wired, wiring: ChannelTable, time: OnDemand | RealTime) -> None:
         self._terminals, self._time, self._device = terminals, time, wiring.device
-        self._inputs, self._outputs = (
-            [line.line for line in wiring.inputs],
-            [line.line for line in wiring.outputs],
-        )
+        self._inputs = [line.line for line in wiring.inputs]
+        self._outputs = [line.line for line in wiring.outputs]
         self._power_line = wiring.power
+        # All four outputs of the card exist and drop to zero, whether or not a signal is wired to
+        # them.
         self.outputs, self.power, self.tick, self.connected = np.zeros(4), False, 0, True
         self._volts = np.zeros(len(self._outputs))
         self._places = [int(line[2:]) for line in self._outputs]
@@ -240,11 +233,13 @@ class VirtualCard:
 
     def _GetDeviceAttributeString(self, request: Message, response: Response) -> Message:
         self._require_device(request.device_name)
+        # DAQmx_Dev_AI_PhysicalChans, _AO_PhysicalChans and _DO_Lines.
         lists = {
             0x231E: [f"ai{n}" for n in range(32)],
             0x231F: [f"ao{n}" for n in range(4)],
             0x2322: [f"port0/line{n}" for n in range(32)],
         }
+        # DAQmx_Dev_ProductType.
         if request.attribute_raw == 0x0631:
             return response(value=PRODUCT)
         return response(
@@ -264,6 +259,8 @@ class VirtualCard:
 
     def _GetDeviceAttributeDoubleArray(self, request: Message, response: Response) -> Message:
         self._require_device(request.device_name)
+        # DAQmx_Dev_AI_VoltageRngs; the client's only other list of doubles is that of the
+        # outputs.
         ranges = INPUT_RANGES if request.attribute_raw == 0x2990 else (10.0,)
         return response(value=[edge for volts in ranges for edge in (-volts, volts)])
 
@@ -367,6 +364,7 @@ class VirtualCard:
         return response()
 
     def _GetReadAttributeUInt32(self, request: Message, response: Response) -> Message:
+        # DAQmx_Read_AvailSampPerChan: samples from the next unread one up to the present.
         return response(value=max(self._time.now(self.tick) - self._task(request).next + 1, 0))
 
     def _ReadAnalogF64(self, request: Message, response: Response) -> Message:
@@ -375,6 +373,7 @@ class VirtualCard:
             task.running, task.next = True, self.tick
         count = max(request.num_samps_per_chan, 1)
         if task.clocked:
+            # Time on demand passes by being read; in real time `_await` has waited already.
             if task.next + count - 1 > self.tick:
                 self.run_until(task.next + count - 1)
             # The buffer holds the latest samples; a reader that is too late has lost its own.

@@ -56,6 +56,8 @@ class WiredTwin:
         """Set forces to zero, and switch the power off."""
         self._commands[:] = 0.0
         to_volts(self._outputs, self._commands, self._commands)
+        # Positions keep their last voltage: a cylinder that jumped to zero would be no safe
+        # state.
         places = self._signals.released_places
         self._held[places], self._power = self._commands[places], False
 

@@ -96,6 +96,7 @@ class FaultyBench:
         if self._kind == "amplifier dead":
             self._show(abs(acting[2]) * MOTOR_CONSTANT > SEEN_FORCE)
             acting[2] = 0.0
+        # The voltage at the moment of the fault stays on the valve.
         elif self._kind == "valve stuck":
             if self._held is None:
                 self._held = float(acting[place])

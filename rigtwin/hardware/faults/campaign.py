@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,14 +18,13 @@ from rigtwin.hardware.daq.table import ChannelTable
 from rigtwin.hardware.daq.transport import InProcess
 from rigtwin.hardware.daq.virtual import BAD_VALUE, DriverError, OnDemand, Response, VirtualCard
 from rigtwin.hardware.faults.bench import FaultyBench
-from rigtwin.hardware.faults.kinds import KINDS, SIGNALS, FaultKind
+from rigtwin.hardware.faults.kinds import KINDS, FaultKind
+from rigtwin.hardware.faults.outcome import FaultResult, InjectedFault, judge
 from rigtwin.hardware.rig_operation import ARMED, LOOKING, SETTLING, Update
 from rigtwin.hardware.session.custom_controller import CustomController
 from rigtwin.hardware.session.record import record_unpaced
 from rigtwin.hardware.session.stops import stop_requests
 from rigtwin.hardware.session.test import Test
-from rigtwin.recording import load
-from rigtwin.recording.reader import transitions
 from rigtwin.simulation.experiment import Experiment
 from rigtwin.system import STOP_SIGNALS, limit_files, raise_signal
 
@@ -41,70 +40,6 @@ SOON = 600
 """Number of ticks after the start within which a fault of a process comes."""
 SLOW = 5
 """Number of ticks that pass during a slow one."""
-
-
-@dataclass(frozen=True)
-class InjectedFault:
-    """Fault of one session.
-
-    Parameters
-    ----------
-    kind : FaultKind
-        Kind of the fault.
-    experiment : str
-        Name of the experiment.
-    at : int
-        Tick of the card at which the fault begins.
-    place : int
-        Index of the faulty input or output.
-    seed : int
-        Seed of the demands, of the sensors' noise, and of the fault's random numbers.
-    """
-
-    kind: FaultKind
-    experiment: str
-    at: int
-    place: int
-    seed: int
-
-
-@dataclass(frozen=True)
-class FaultResult:
-    """Result of a session with a fault.
-
-    Parameters
-    ----------
-    fault : InjectedFault
-        Fault of the session.
-    late : int or None
-        Number of ticks from the fault's first visibility to safe outputs. None if it never became
-        visible and the test was completed.
-    from_start : int
-        Number of ticks from the fault to safe outputs.
-    exceeded : float
-        Largest true position, travel or force, relative to its limit.
-    cause, reason : str
-        Cause and reason of the end in the recording.
-    right : bool
-        Whether cause and reason name the fault.
-    readable : bool
-        Whether the recording can be read up to its last tick.
-    """
-
-    fault: InjectedFault
-    late: int | None
-    from_start: int
-    exceeded: float
-    cause: str
-    reason: str
-    right: bool
-    readable: bool
-
-    @property
-    def ok(self) -> bool:
-        """Whether the rig stopped within 5 ticks and 1.1 times every limit, for the true cause."""
-        in_time = self.late is None or self.late <= 5
-        return in_time and self.exceeded <= 1.1 and self.right and self.readable
 
 
 def draw_faults(count: int, seed: int, kinds: Sequence[FaultKind] = KINDS) -> list[InjectedFault]:
@@ -220,28 +155,15 @@ def try_fault(
         If a real operator ended the campaign.
     """
     test = replace(plan_test(fault, experiment, table), controller=controller)
-    period, name = test.configuration.timing.period, fault.kind.name
-    bench = FaultyBench(
-        test.terminals(),
-        table,
-        kind=name,
-        at=fault.at,
-        place=fault.place,
-        seed=fault.seed,
-        ticks=count_card_ticks(test),
-    )
-    virtual = _GlitchingCard(bench, table, OnDemand())
-    if fault.kind.place == "card":
-        virtual.glitch = (name, fault.at)
-    # Time is the virtual card's, so results do not depend on this computer's speed.
-    card = Card(table, period, InProcess(virtual), clock=lambda: virtual.tick * period)
+    bench, virtual, card = _open_faulty_card(fault, test)
     path, stop_file = folder / f"{fault.seed}.mcap", folder / f"{fault.seed}.stop"
     interrupted: list[str] = []
     with _full_disk(path) as fill, stop_requests(stop_file) as find_request:
         stop = _make_stop(fault, virtual, stop_file, fill, find_request, interrupted)
 
         def show_full_disk(_: int) -> None:
-            if name == "full disk" and virtual.tick >= fault.at and bench.shown < 0:
+            full = fault.kind.name == "full disk" and virtual.tick >= fault.at
+            if full and bench.shown < 0:
                 bench.shown = virtual.tick
 
         updating = test.updating()
@@ -257,6 +179,26 @@ def try_fault(
     if interrupted:
         raise KeyboardInterrupt(interrupted[0])
     return judge(fault, test, bench, path)
+
+
+def _open_faulty_card(fault: InjectedFault, test: Test) -> tuple[FaultyBench, _GlitchingCard, Card]:
+    """Return a rig with the fault, the virtual card in front of it, and the client's card."""
+    period = test.configuration.timing.period
+    bench = FaultyBench(
+        test.terminals(),
+        test.table,
+        kind=fault.kind.name,
+        at=fault.at,
+        place=fault.place,
+        seed=fault.seed,
+        ticks=count_card_ticks(test),
+    )
+    virtual = _GlitchingCard(bench, test.table, OnDemand())
+    if fault.kind.place == "card":
+        virtual.glitch = (fault.kind.name, fault.at)
+    # Time is the virtual card's, so results do not depend on this computer's speed.
+    card = Card(test.table, period, InProcess(virtual), clock=lambda: virtual.tick * period)
+    return bench, virtual, card
 
 
 def _make_stop(
@@ -320,69 +262,3 @@ def _full_disk(path: Path) -> Iterator[Callable[[], None]]:
     """Provide a function after which the system lets no file grow."""
     with limit_files() as limit:
         yield lambda: limit(path.stat().st_size)
-
-
-def judge(fault: InjectedFault, test: Test, bench: FaultyBench, path: Path) -> FaultResult:
-    """Judge a session by the log at its terminals and by its recording.
-
-    Parameters
-    ----------
-    fault : Fault
-        Fault of the session.
-    test : Test
-        Test of the session.
-    bench : FaultyBench
-        Terminals with the log.
-    path : Path
-        Path of the recording.
-
-    Returns
-    -------
-    FaultResult
-        Result, with times in ticks of the card.
-    """
-    cause, reason = read_final_cause(path)
-    safe = bench.find_safe_tick()
-    # A fault may never show, such as a stuck valve that nobody asks to move: then the test must
-    # have been completed.
-    harmless = cause == "completed"
-    shown = fault.at if fault.kind.everywhere else bench.shown
-    # A fault that never showed and did no harm has no delay.
-    late = None if harmless and shown < 0 else safe - (shown if shown >= 0 else safe)
-    # A sensor's fault must be blamed on the right sensor, not only on the right cause.
-    named = (
-        fault.kind.place != "sensor"
-        or cause not in ("jump", "stuck", "not_a_number")
-        or SIGNALS[fault.place] in reason
-    )
-    right = named and (cause in fault.kind.causes or (harmless and shown < 0))
-    exceeded = bench.peak_share(test.card_configuration.safety, fault.at)
-    return FaultResult(
-        fault,
-        late=late,
-        from_start=safe - fault.at,
-        exceeded=exceeded,
-        cause=cause,
-        reason=reason,
-        right=right,
-        readable=is_readable(path),
-    )
-
-
-def read_final_cause(path: Path) -> tuple[str, str]:
-    """Return cause and reason of a recording's last transition; empty texts if it has none."""
-    last = transitions(path)
-    return (last[-1]["cause"], last[-1]["reason"]) if last else ("", "")
-
-
-def is_readable(path: Path) -> bool:
-    """Return whether a recording can be read as far as it goes.
-
-    A recording that ended before the test began contains only transitions.
-    """
-    try:
-        recording = load(path)
-    except RigtwinError as error:
-        return "no ticks" in str(error) and bool(read_final_cause(path)[0])
-    # Reading must also give usable times.
-    return bool(np.all(np.isfinite(recording.time)))

@@ -19,20 +19,14 @@ from pathlib import Path
 from controllers import Commands, Controller, Demand, Measurements, MilState
 from controllers import update as healthy
 from rigtwin.errors import RigtwinError
-from rigtwin.hardware.daq.card import Card, connect
+from rigtwin.hardware.daq.card import Card
+from rigtwin.hardware.daq.driver import connect
 from rigtwin.hardware.daq.table import ChannelTable
 from rigtwin.hardware.daq.transport import LOCAL, serve
 from rigtwin.hardware.daq.virtual import RealTime, VirtualCard
 from rigtwin.hardware.faults.bench import FaultyBench
-from rigtwin.hardware.faults.campaign import (
-    BEFORE,
-    FaultResult,
-    InjectedFault,
-    count_card_ticks,
-    judge,
-    plan_test,
-    read_final_cause,
-)
+from rigtwin.hardware.faults.campaign import BEFORE, count_card_ticks, plan_test
+from rigtwin.hardware.faults.outcome import FaultResult, InjectedFault, judge, read_final_cause
 from rigtwin.hardware.realtime import in_real_time
 from rigtwin.hardware.session.guardian import Guardian
 from rigtwin.hardware.session.record import guardian_settings
@@ -119,6 +113,7 @@ def _try_once(fault: InjectedFault, test: Test, folder: Path) -> FaultResult:
         # One more tick logs the outputs that the guardian has set.
         virtual.run_until(virtual.tick + 1)
     finally:
+        # SIGKILL, since a frozen process would not act on SIGTERM before it is continued.
         controller.kill()
         controller.join()
         server.stop(0.0).wait()

@@ -54,6 +54,7 @@ def custom_controller(make: ControllerFactory) -> CustomController:
     # The digest covers the whole module, since a controller depends on what stands beside it.
     try:
         source = inspect.getsource(inspect.getmodule(make) or make)
+    # Controllers from a prompt or a C extension have no source; their name has to do.
     except (OSError, TypeError):
         source = name
     return CustomController(make, f"{name} {hashlib.sha256(source.encode()).hexdigest()[:16]}")
@@ -70,6 +71,7 @@ def make_tick(controller: CustomController, configuration: Configuration) -> Cal
     try:
         made: Any = controller.make(configuration)
     except Exception as error:
+        # An error's text may have several lines; a message has one.
         reason = " ".join(f"{type(error).__name__}: {error}".split())
         raise RigtwinError(
             f"controller {controller.identity}: it cannot be made: {reason}"

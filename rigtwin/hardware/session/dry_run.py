@@ -9,7 +9,8 @@ from pathlib import Path
 
 from rigtwin.description.configuration import Configuration, flatten
 from rigtwin.errors import RigtwinError
-from rigtwin.hardware.daq.table import ChannelTable, to_toml
+from rigtwin.hardware.daq.table import ChannelTable
+from rigtwin.hardware.daq.table_file import to_toml
 
 
 def digest(title: str, configuration: Configuration, demands: bytes, table: ChannelTable) -> str:
@@ -55,6 +56,7 @@ def has_passed(card: Path, key: str) -> bool:
 def add_dry_run(card: Path, key: str, entry: Mapping[str, str]) -> None:
     """Add a completed dry run to the list. Raise RigtwinError if it cannot be written."""
     path = ledger(card)
+    # An entry of the same session is renewed; all others stay.
     entries = {**_entries(path), key: dict(entry)}
     # The list is replaced as a whole, so that a crash leaves the old one intact.
     temporary = path.with_suffix(".json.new")

@@ -49,6 +49,7 @@ class Guardian:
         """
         self._settings, self._finishing = settings, False
         self.fault: str | None = None
+        # A forked guardian would inherit the loop's gRPC threads and locks in an unknown state.
         context = multiprocessing.get_context("spawn")
         layout = settings.layout
         memory = context.RawArray("d", memory_size(layout))
@@ -126,6 +127,7 @@ class Guardian:
         """End the recording and the guardian."""
         self._shared[GUARDED], self._finishing = 0.0, True
         self._send("finish", reason)
+        # A guardian that has failed may never end by itself, so it is given less time.
         self._process.join(STARTED if self.fault is None else ABSENT)
         self._release()
 

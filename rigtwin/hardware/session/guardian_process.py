@@ -81,6 +81,8 @@ def guard(settings: GuardianSettings, pipe: Connection, memory: SharedMemory, ow
     # The rig is made safe first; the recording is finished after that.
     if died is not None:
         keeper.stop_rig(died, shared)
+    # The writing thread ends when the pipe closes; a killed process that the system has not yet
+    # removed still holds it open.
     thread.join(1.0)
     keeper.finish(died)
 
@@ -205,6 +207,8 @@ class _GuardianRecorder:
         said = cause.reason
         failsafe = self._failsafe
         if failsafe is not None:
+            # The guardian holds its outputs for the same time as the loop would: first safe, then
+            # without power.
             failed = _try_often(lambda: failsafe.hold(shared[SAFE:]))
             if failed is None:
                 time.sleep(self._settings.hold)

@@ -50,9 +50,7 @@ def open_live_view(port: int, fields: Mapping[str, Sequence[str]]) -> Callable[[
         # A topic is announced with its first rows, because not every session has every topic.
         if topic not in channels:
             schema = foxglove.Schema(
-                name=type_name(topic),
-                encoding="protobuf",
-                data=descriptor(topic, fields[topic]),
+                name=type_name(topic), encoding="protobuf", data=descriptor(topic, fields[topic])
             )
             channels[topic] = foxglove.Channel(topic, schema=schema, message_encoding="protobuf")
         for row in rows[::SHOWN]:

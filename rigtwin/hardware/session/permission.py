@@ -59,17 +59,17 @@ def require_permission(test: AnyTest, card: Path, without_dry_run: str | None) -
     if test.effects:
         raise RigtwinError("--effect is the twin's; the rig has its own")
     require_trust(test.table, date.today())
+    # Built only to be checked: it raises an error if a limit exceeds what a line can carry.
     test.operation()
     test.require_limits()
-    opened = open_card(test)
+    opened = open_card(test.table, test.period)
     if has_passed(card, key_of(test)):
         return Permission(opened, ())
     # A missing dry run is possible, but somebody's name stands for it in the recording.
     if not without_dry_run:
         raise RigtwinError(
-            f"{test.experiment} with these settings has had no dry run; do it first: "
-            "the same command with --dry-run "
-            "(or say who answers for it: --without-dry-run NAME)"
+            f"{test.experiment} with these settings has had no dry run; do it first: the same "
+            "command with --dry-run (or say who answers for it: --without-dry-run NAME)"
         )
     note = ("rigtwin.override", {"dry run": f"left out by {without_dry_run}"})
     return Permission(opened, (note,))
@@ -78,7 +78,7 @@ def require_permission(test: AnyTest, card: Path, without_dry_run: str | None) -
 def list_obstacles(test: AnyTest) -> tuple[str, ...]:
     """Return what prevents a test on the machine besides a missing dry run, one per line."""
     lacking = list_doubts(test.table, date.today())
-    for look in (test.require_limits, lambda: open_card(test)):
+    for look in (test.require_limits, lambda: open_card(test.table, test.period)):
         try:
             look()
         except RigtwinError as error:

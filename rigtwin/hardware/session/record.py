@@ -9,8 +9,10 @@ from pathlib import Path
 
 from rigtwin import __version__
 from rigtwin.description.configuration import flatten
-from rigtwin.hardware.daq.card import Card, connect, require_client
-from rigtwin.hardware.daq.table import to_toml
+from rigtwin.hardware.daq.card import Card
+from rigtwin.hardware.daq.driver import connect, require_client
+from rigtwin.hardware.daq.table import ChannelTable
+from rigtwin.hardware.daq.table_file import to_toml
 from rigtwin.hardware.daq.virtual import OnDemand, VirtualCard
 from rigtwin.hardware.daq.wired import Wired
 from rigtwin.hardware.operation import Operation
@@ -217,10 +219,7 @@ def record_in_real_time(
         If the session cannot begin; nothing has moved then.
     """
     operation = test.operation()
-    course = operation.course
-    # Upper bound on the ticks, with a second to spare: the statistics' memory must not grow later.
-    whole = operation.ticks + round(2.0 * (course.ramp + course.hold + 1.0) / operation.period)
-    lateness = Lateness(whole)
+    lateness = Lateness(_count_ticks(operation))
     # The guardian starts before this process takes real-time priority, which it would inherit.
     guardian = Guardian(guardian_settings(test, path, guarded, notes, live))
     with ExitStack() as stack:
@@ -236,12 +235,17 @@ def record_in_real_time(
     return ended
 
 
-def open_card(test: AnyTest) -> Card:
+def _count_ticks(operation: Operation) -> int:
+    """Return an upper bound on a session's ticks: the statistics' memory must not grow later."""
+    course = operation.course
+    # Both ramps and the hold, with a second to spare.
+    return operation.ticks + round(2.0 * (course.ramp + course.hold + 1.0) / operation.period)
+
+
+def open_card(table: ChannelTable, period: float) -> Card:
     """Open the card and inspect it. Raise CardFault; nothing moves."""
-    period = test.period
-    channel = connect(test.table.address)
     # A card without its own clock is paced by this computer.
-    pacer = Pacer(period) if test.table.timing == "software" else None
-    card = Card(test.table, period, channel, pacer=pacer)
+    pacer = Pacer(period) if table.timing == "software" else None
+    card = Card(table, period, connect(table.address), pacer=pacer)
     card.inspect()
     return card

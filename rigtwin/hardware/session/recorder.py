@@ -112,6 +112,7 @@ class SessionRecorder:
         tested = rows[np.isfinite(rows[:, number])]
         if len(tested):
             topics = {topic: tested[:, places] for topic, places in self._places.items()}
+            # Missed ticks leave gaps in the numbers, which become gaps in the recorded times.
             self._try(lambda: self._writer.append_at(tested[:, number].astype(np.int64), topics))
         session = np.ascontiguousarray(rows[:, : len(self._layout.session)])
         self._try(lambda: self._writer.append_beside(SESSION, session, session[:, 0]))

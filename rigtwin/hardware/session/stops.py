@@ -32,6 +32,8 @@ def stop_requests(file: Path | None = None) -> Iterator[Callable[[], str | None]
 
             def find_request() -> str | None:
                 if requests:
+                    # The first request is the cause; impatient repetitions of Ctrl-C change
+                    # nothing.
                     return requests[0]
                 if path is not None and os.path.exists(path):  # noqa: PTH110 - 1 us instead of 3, every tick
                     return f"stopped by the operator: file {path}"

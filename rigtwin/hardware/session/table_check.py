@@ -18,12 +18,12 @@ from rigtwin.hardware.daq.calibration import (
     measure_rest,
     plan_bumps,
 )
-from rigtwin.hardware.daq.card import Card, connect, require_client
+from rigtwin.hardware.daq.card import Card
+from rigtwin.hardware.daq.driver import require_client
 from rigtwin.hardware.daq.table import OUTPUTS, ChannelTable, Plausible
 from rigtwin.hardware.daq.terminals import Terminals
 from rigtwin.hardware.daq.virtual import OnDemand, VirtualCard
-from rigtwin.hardware.realtime import Pacer
-from rigtwin.hardware.session.record import record_in_real_time, record_unpaced
+from rigtwin.hardware.session.record import open_card, record_in_real_time, record_unpaced
 from rigtwin.hardware.session.test import Test
 from rigtwin.hardware.supervisor import COMPLETED
 from rigtwin.recording import load
@@ -36,18 +36,12 @@ def open_rig(table: ChannelTable, wiring: ChannelTable | None) -> Card:
     """Open a table's card, or a virtual one with another wiring. Raise RigtwinError if it fails."""
     period = Configuration().timing.period
     if wiring is None:
-        card = Card(
-            table,
-            period,
-            connect(table.address),
-            pacer=Pacer(period) if table.timing == "software" else None,
-        )
-    else:
-        require_client()
-        from rigtwin.hardware.daq.transport import InProcess
+        return open_card(table, period)
+    require_client()
+    from rigtwin.hardware.daq.transport import InProcess
 
-        virtual = VirtualCard(Terminals(Configuration(), wiring, 0), wiring, OnDemand())
-        card = Card(table, period, InProcess(virtual), clock=lambda: virtual.tick * period)
+    virtual = VirtualCard(Terminals(Configuration(), wiring, 0), wiring, OnDemand())
+    card = Card(table, period, InProcess(virtual), clock=lambda: virtual.tick * period)
     card.inspect()
     return card
 
@@ -84,10 +78,7 @@ def look_at_rest(table: ChannelTable, wiring: ChannelTable | None) -> tuple[Rest
 
 
 def move_outputs(
-    table: ChannelTable,
-    wiring: ChannelTable | None,
-    stroke: float,
-    stop: Callable[[], str | None],
+    table: ChannelTable, wiring: ChannelTable | None, stroke: float, stop: Callable[[], str | None]
 ) -> dict[str, tuple[str, float, float]]:
     """Move every output a little, one after another, under supervision.
 

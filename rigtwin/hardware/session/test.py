@@ -82,6 +82,7 @@ class Test:
         settings: dict[str, Any] = flatten(self.configuration)["controller"]
         if self.controller is None:
             return settings
+        # The machine's other settings did not act, and would mislead a reader of the recording.
         return {OWN: True, **{name: settings[name] for name in ("start", "preload")}}
 
     def updating(self) -> Update:

@@ -66,6 +66,7 @@ def critical_delay(loop: Loop) -> Critical | None:
 
 def _lag_condition(inverse: Roots) -> Array:
     """Return a value between −1 and 1 that is zero where 1/z = 1 + jωτ."""
+    # Re(1/z) = 1, bounded by the size of 1/z so that a root at infinity gives no overflow.
     return (inverse.real - 1.0) / (1.0 + np.abs(inverse))
 
 
@@ -84,9 +85,7 @@ def _delay_times(inverse: Roots, frequency: float) -> Array:
 
 
 def _smallest(
-    loop: Loop,
-    condition: Callable[[Roots], Array],
-    times: Callable[[Roots, float], Array],
+    loop: Loop, condition: Callable[[Roots], Array], times: Callable[[Roots, float], Array]
 ) -> Critical | None:
     # A loop that is unstable without any lag has the critical time 0.
     poles = roots(instant(loop).coef)
@@ -122,9 +121,11 @@ def _frequencies(loop: Loop) -> Array:
     """Return a frequency grid, in rad/s, that spans all crossings and is dense at resonances."""
     # Roots at s = 0 are no resonances: a common power of s is divided out of each polynomial.
     polynomials = (*loop.values(), instant(loop))
+    # Coefficients rise with the power of s, so zeros at the front are roots at s = 0.
     trimmed = [Polynomial(np.trim_zeros(polynomial.coef, "f")) for polynomial in polynomials]
     resonances = np.abs(np.concatenate([polynomial.roots() for polynomial in trimmed]))
     resonances = resonances[resonances > 0.0]
+    # Three decades below the slowest resonance the loop is its own static limit.
     low = np.log10(resonances.min()) - 3.0
     high = np.log10(max(bound(loop), resonances.max())) + 0.1
     # Distances to a resonance halve, because crossings crowd there when damping is small.
@@ -132,8 +133,8 @@ def _frequencies(loop: Loop) -> Array:
     near = resonances[:, None] * np.concatenate([1.0 - towards, 1.0 + towards])
     return np.unique(
         np.concatenate(
-            [np.logspace(low, high, int((high - low) * POINTS_PER_DECADE)), near.ravel()],
-        ),
+            [np.logspace(low, high, int((high - low) * POINTS_PER_DECADE)), near.ravel()]
+        )
     )
 
 

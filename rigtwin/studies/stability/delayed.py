@@ -42,7 +42,7 @@ def rightmost_delay_root(loop: Loop, delay: float) -> complex:
     converged = [root for root in refined if root is not None]
     if not converged:
         raise RigtwinError(
-            f"no root found with a delay of {delay:g} s: expected a loop of bounded frequencies",
+            f"no root found with a delay of {delay:g} s: expected a loop of bounded frequencies"
         )
     best = max(converged, key=lambda root: root.real)
     return complex(best.real, abs(best.imag))
@@ -56,14 +56,14 @@ def _generator_eigenvalues(loop: Loop, delay: float, nodes: int) -> Roots:
     powers = scale ** np.arange(degree + 1)
     leading = loop[0].coef[-1] * powers[-1]
     longest = scale * delay * order(loop)
+    # Nodes from cos 0 = 1, the present, to cos π = −1, the longest delay ago.
     angles = np.pi * np.arange(nodes + 1) / nodes
     points = np.cos(angles)
     # Barycentric weights of Chebyshev nodes of the second kind: ±1, halved at both ends.
     weights = (-1.0) ** np.arange(nodes + 1) * np.where(
-        (angles == 0.0) | (np.arange(nodes + 1) == nodes),
-        0.5,
-        1.0,
+        (angles == 0.0) | (np.arange(nodes + 1) == nodes), 0.5, 1.0
     )
+    # The derivative along the past: d/dθ of the state history, for each of its components.
     generator = np.kron(_derivative(points, weights) * (2.0 / longest), np.eye(degree))
     # The first block row is the splicing condition: the delay equation itself at the present.
     generator[:degree] = 0.0
@@ -73,6 +73,8 @@ def _generator_eigenvalues(loop: Loop, delay: float, nodes: int) -> Roots:
     for power, polynomial in loop.items():
         coefficients = np.zeros(degree + 1)
         coefficients[: len(polynomial.coef)] = polynomial.coef
+        # A delay of `power` lags lies at this place between the present, 1, and the longest
+        # delay, −1.
         at = _interpolation(points, weights, 1.0 - 2.0 * power / order(loop))
         generator[degree - 1] -= np.kron(at, (coefficients * powers / leading)[:degree])
     return scale * np.linalg.eigvals(generator)
@@ -101,6 +103,7 @@ def _refine(loop: Loop, delay: float, s: complex) -> complex | None:
     """Return the root Newton's method converges to, or None without convergence."""
     slopes = {power: polynomial.deriv() for power, polynomial in loop.items()}
     for _ in range(NEWTON_STEPS):
+        # d/ds of Σ p_k(s) e^{−kτs}: each term gives (p_k′ − k τ p_k) e^{−kτs}.
         slope = sum(
             (slopes[power](s) - power * delay * polynomial(s)) * np.exp(-power * delay * s)
             for power, polynomial in loop.items()

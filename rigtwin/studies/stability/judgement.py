@@ -81,7 +81,9 @@ def judge(vehicle: QuarterCar, tau: float, delay: bool) -> Stability:
     models = {}
     for name, model in MODELS.items():
         loop = LOOPS[name](vehicle)
+        # With delays there is no finite set of poles, so the rightmost root is searched for.
         pole = rightmost_delay_root(loop, tau) if delay else rightmost(model(vehicle, tau))
+        # Both tolerances of the loop are reported, whichever of lags and delays is asked about.
         lag, pure = critical_lag(loop), critical_delay(loop)
         models[name] = ModelStability(
             real=pole.real,

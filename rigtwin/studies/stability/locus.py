@@ -82,7 +82,7 @@ class Locus:
     def poles(self) -> np.ndarray:
         """Poles, in 1/s, one row per value."""
         return np.linalg.eigvals(np.array([self._dynamics(value) for value in self.values])).astype(
-            complex,
+            complex
         )
 
     @cached_property
@@ -90,7 +90,7 @@ class Locus:
         """Poles without any lag, in 1/s, one row per value."""
         ideal = self._ideal
         return np.linalg.eigvals(
-            np.array([ideal(self.at(value).car) for value in self.values]),
+            np.array([ideal(self.at(value).car) for value in self.values])
         ).astype(complex)
 
     def poles_at(self, value: float) -> np.ndarray:
@@ -110,6 +110,7 @@ class Locus:
     @cached_property
     def crossings(self) -> list[Crossing]:
         """Crossings of the imaginary axis, in the order of the swept values."""
+        # Only intervals where the number of unstable poles changes are searched.
         counts = np.sum(_is_unstable(self.poles), axis=1)
         crossings: list[Crossing] = []
         for i in np.flatnonzero(counts[:-1] != counts[1:]):

@@ -55,6 +55,7 @@ def quarter_car(car: QuarterCar, force: int, structure: int) -> Loop:
     wheel = Polynomial([car.tyre_stiffness, car.tyre_damping, car.unsprung_mass])
     suspension = Polynomial([car.suspension_stiffness, car.suspension_damping])
     loop: dict[int, Polynomial] = {0: sprung * wheel}
+    # Without a lag of the structure both terms have the same power of z, and add up.
     for power, term in ((force, suspension * sprung), (force + structure, suspension * wheel)):
         loop[power] = loop[power] + term if power in loop else term
     return loop
@@ -94,7 +95,7 @@ def lag_polynomial(loop: Loop, lag: float) -> Polynomial:
 def delay_function(loop: Loop, delay: float, s: complex) -> complex:
     """Return the characteristic function at s, with z = exp(−delay s) and the delay in s."""
     return complex(
-        sum(polynomial(s) * np.exp(-power * delay * s) for power, polynomial in loop.items()),
+        sum(polynomial(s) * np.exp(-power * delay * s) for power, polynomial in loop.items())
     )
 
 

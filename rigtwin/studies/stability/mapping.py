@@ -121,7 +121,7 @@ def stability_map(model: str, car: QuarterCar, lag: float, across: Axis, up: Axi
         raise RigtwinError(f"a map of {model} over {LAG}: the model has the rig's own lags; {hint}")
     if across.name == up.name:
         raise RigtwinError(
-            f"a map over {across.name} and {up.name}: expected two different parameters",
+            f"a map over {across.name} and {up.name}: expected two different parameters"
         )
     rows = [_change((validate(car), lag), up.name, float(value)) for value in up.values]
     settings = [_change(row, across.name, float(value)) for row in rows for value in across.values]
@@ -139,13 +139,7 @@ def stability_map(model: str, car: QuarterCar, lag: float, across: Axis, up: Axi
         limits = [critical_lag(LOOPS[model](vehicle)) for vehicle in cars]
         critical = np.array([np.nan if limit is None else limit.time for limit in limits])
     return StabilityMap(
-        model=model,
-        car=car,
-        lag=lag,
-        across=across,
-        up=up,
-        rightmost=rightmost,
-        critical=critical,
+        model=model, car=car, lag=lag, across=across, up=up, rightmost=rightmost, critical=critical
     )
 
 
@@ -159,7 +153,7 @@ def check_image_format(out: Path) -> None:
     """Raise RigtwinError unless the file name ends in a supported image format."""
     if out.suffix.lower() not in KINDS:
         raise RigtwinError(
-            f"cannot draw {out.name!r}: expected a file name that ends in {', '.join(KINDS)}",
+            f"cannot draw {out.name!r}: expected a file name that ends in {', '.join(KINDS)}"
         )
 
 
@@ -177,15 +171,11 @@ def draw(stability: StabilityMap, out: Path) -> None:
     axes = figure.subplots()
     # Rates of decay span decades on both sides of zero: logarithmic, but linear near zero.
     largest = float(np.abs(stability.rightmost).max())
+    # Equal ends on both sides put the limit of stability at the colour map's neutral middle.
     norm = SymLogNorm(1e-2 * largest, vmin=-largest, vmax=largest)
     across, up = stability.across, stability.up
     shades = axes.pcolormesh(
-        across.values,
-        up.values,
-        stability.rightmost,
-        cmap="RdBu_r",
-        norm=norm,
-        shading="nearest",
+        across.values, up.values, stability.rightmost, cmap="RdBu_r", norm=norm, shading="nearest"
     )
     figure.colorbar(shades, ax=axes, label="real part of the rightmost pole, 1/s (stable below 0)")
     _draw_limit(axes, stability)

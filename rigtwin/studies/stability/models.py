@@ -106,9 +106,7 @@ def ideal_quarter_car(car: QuarterCar) -> StateSpace:
 def suspension(car: QuarterCar, lag: float) -> StateSpace:
     """Return the model of a quarter car whose suspension force has a lag, in s (5.48)."""
     return _quarter_car(
-        car,
-        {"force": _filtered_force(car, "body", "body_velocity", lag)},
-        {"force": 1.0},
+        car, {"force": _filtered_force(car, "body", "body_velocity", lag)}, {"force": 1.0}
     )
 
 
@@ -145,7 +143,7 @@ def rig(car: QuarterCar, lags: Lags) -> StateSpace:
     velocity |= {"wheel_velocity": -1.0 / lags.velocity, "velocity": -1.0 / lags.velocity}
     demanded = {"travel": car.suspension_stiffness, "velocity": car.suspension_damping}
     force = {name: value / lags.force for name, value in demanded.items()} | {
-        "force": -1.0 / lags.force,
+        "force": -1.0 / lags.force
     }
     return _quarter_car(
         car,
@@ -173,6 +171,7 @@ def poles(system: StateSpace) -> np.ndarray:
 
 def rightmost(system: StateSpace) -> complex:
     """Return the pole with the largest real part, in 1/s; of a pair, the one with Im > 0."""
+    # Rounding, so that of a pair with equal real parts the imaginary part decides.
     return complex(max(poles(system).tolist(), key=lambda pole: (round(pole.real, 9), pole.imag)))
 
 
@@ -205,15 +204,12 @@ def _filtered_force(car: QuarterCar, position: str, velocity: str, lag: float) -
     """Return the row of the suspension force after its lag (5.45)."""
     check_time("lag", lag)
     return {name: value / lag for name, value in _force(car, position, velocity).items()} | {
-        "force": -1.0 / lag,
+        "force": -1.0 / lag
     }
 
 
 def _quarter_car(
-    car: QuarterCar,
-    filters: Rows,
-    force: dict[str, float],
-    *outputs: str,
+    car: QuarterCar, filters: Rows, force: dict[str, float], *outputs: str
 ) -> StateSpace:
     """Return the system of both masses (5.46, 5.47) under a suspension force."""
     validate(car)
@@ -237,11 +233,5 @@ def _system(rows: Rows, *outputs: str) -> StateSpace:
     ground = np.array([[row.get(GROUND, 0.0)] for row in rows.values()])
     read = np.array([[float(state == output) for state in states] for output in outputs])
     return StateSpace(
-        dynamics,
-        ground,
-        read,
-        0.0,
-        states=states,
-        inputs=[GROUND],
-        outputs=list(outputs),
+        dynamics, ground, read, 0.0, states=states, inputs=[GROUND], outputs=list(outputs)
     )

@@ -188,7 +188,7 @@ def mechanics(plant: RigPlant, preload: float) -> tuple[Array, Array, Array]:
     a, b, c = np.zeros((9, 9)), np.zeros((9, 2)), np.zeros((3, 9))
     a[CYLINDER, CYLINDER] = inner
     for number, (lag, gain, place) in enumerate(
-        ((cylinder.lag, cylinder.gain, FED), (motor.lag, motor.gain, VOLTS)),
+        ((cylinder.lag, cylinder.gain, FED), (motor.lag, motor.gain, VOLTS))
     ):
         if lag > 0.0:
             a[place, place], b[place, number] = -1.0 / lag, gain / lag
@@ -210,15 +210,18 @@ def mechanics(plant: RigPlant, preload: float) -> tuple[Array, Array, Array]:
     cell[FORCE], cell[SPEED] = 1.0, motor.viscous
     # The tyre is linearised where it carries the preload.
     squeezed, step = initial_deflection(plant, preload), 1e-6
+    # A central difference: the tyre's law may be nonlinear.
     around = tyre_force(plant.tyre, np.array([squeezed - step, squeezed + step]), np.zeros(2))
     # A gas spring acts between plate and wheel, linearised at rest.
     gas = stiffness(plant.gas_spring, 0.0) if plant.gas_spring.force > 0.0 else 0.0
     a[WHEEL, SPEED] = 1.0
+    # Newton's law of the wheel: the suspension pushes it down, the tyre up, the rail brakes it.
     a[SPEED] = -cell + gas * plate
     a[SPEED, WHEEL] -= (around[1] - around[0]) / (2.0 * step) + gas
     a[SPEED, SPEED] -= plant.tyre.damping + plant.rail.viscous
     a[SPEED] /= plant.carriage.mass
     c[0] = c[1] = plate
+    # Travel = plate − wheel.
     c[1, WHEEL] -= 1.0
     c[2] = cell
     return a, b, c
@@ -234,12 +237,10 @@ def _transducer(sensor: object, period: float) -> tuple[Array, Array, Array, flo
     part = max(delay / period - whole, 0.0)
     # A lag's discrete filter: y[k] = y[k-1] + share (x[k] - y[k-1]).
     length, share = whole + 1, 1.0 if lag == 0.0 else 1.0 - math.exp(-period / lag)
-    a, b, late, direct = (
-        np.zeros((length + 1,) * 2),
-        np.zeros((length + 1, 1)),
-        np.zeros(length + 1),
-        0.0,
-    )
+    a = np.zeros((length + 1,) * 2)
+    b = np.zeros((length + 1, 1))
+    late = np.zeros(length + 1)
+    direct = 0.0
     b[0, 0] = 1.0
     for place in range(1, length):
         a[place, place - 1] = 1.0
@@ -273,6 +274,7 @@ def linear_controller(
     # At rest the structure model carries its weight, so that nothing moves.
     rest = np.array([0.0, settings.start, 0.0, settings.sprung_mass * settings.gravity])
     start = initial_state(controlling)
+    # One tick at rest fills the filters' memories, which start empty.
     state, _ = update(controlling, start, Measurements(*rest.tolist()), demand)
     numbers = np.array(packed(state), dtype=float)
 
@@ -297,10 +299,10 @@ def linear_controller(
         return np.where(np.abs(change) > noise, change, 0.0)
 
     by_state = np.column_stack(
-        [slope(PERTURBATION * _unit(SIZE, place), True) for place in range(SIZE)],
+        [slope(PERTURBATION * _unit(SIZE, place), True) for place in range(SIZE)]
     )
     by_sensor = np.column_stack(
-        [slope(PERTURBATION * _unit(4, place), False) for place in (1, 2, 3)],
+        [slope(PERTURBATION * _unit(4, place), False) for place in (1, 2, 3)]
     )
     return (by_state[:SIZE], by_sensor[:SIZE]), (by_state[SIZE:], by_sensor[SIZE:])
 

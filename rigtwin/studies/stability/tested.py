@@ -63,10 +63,11 @@ def configure_vehicle(car: QuarterCar) -> Configuration:
     preload = CARRIED * car.sprung_mass * Settings().gravity
     return Configuration(
         plant=RigPlant(
-            carriage=Carriage(car.unsprung_mass),
-            tyre=Tyre(car.tyre_stiffness, car.tyre_damping),
+            carriage=Carriage(car.unsprung_mass), tyre=Tyre(car.tyre_stiffness, car.tyre_damping)
         ),
         controller=Settings(
+            # The wheel rests on a tyre compressed by the preload, so the plate starts that much
+            # lower.
             start=-preload / car.tyre_stiffness,
             sprung_mass=car.sprung_mass,
             suspension_stiffness=car.suspension_stiffness,
@@ -100,10 +101,7 @@ def set_for_compensation(
     """
     short = with_filters(with_exact_plate(configuration), FILTER)
     controller = short.controller._replace(
-        compensator=Compensator.OBSERVER,
-        kp=KP,
-        ki=KI,
-        plate_compensator=compensator,
+        compensator=Compensator.OBSERVER, kp=KP, ki=KI, plate_compensator=compensator
     )
     return short._replace(controller=controller)
 

@@ -94,7 +94,7 @@ def _within(name: str, value: float, low: float, high: float) -> None:
     damping = name.endswith("damping")
     if not (low <= value <= high or (damping and value == 0.0)):
         raise RigtwinError(
-            f"{name} {value:g}: expected {'0, or ' if damping else ''}{low:g} to {high:g}",
+            f"{name} {value:g}: expected {'0, or ' if damping else ''}{low:g} to {high:g}"
         )
 
 

@@ -61,9 +61,7 @@ def run_jobs(
 
 
 def iterate_results(
-    workers: Workers,
-    function: Callable[[Any], Any],
-    jobs: Iterable[Job],
+    workers: Workers, function: Callable[[Any], Any], jobs: Iterable[Job]
 ) -> Iterator[tuple[str, Any]]:
     """Yield the key and the result of every job, in the order in which they finish.
 
@@ -108,13 +106,10 @@ def iterate_results(
             # attempts.
             except workers.lost:
                 losses[key] += 1
-                if losses[key] >= MOST_LOSSES:
-                    causes = "out of memory, killed, or it could not start"
-                    raise RigtwinError(
-                        f"a worker died {MOST_LOSSES} times over {key}: {causes}"
-                    ) from None
+                _require_survival(key, losses[key])
                 submit((key, argument))
                 continue
+            # Counts of jobs that are done would otherwise grow with the sweep.
             losses.pop(key, None)
             yield key, result
             for job in islice(coming, ahead - len(waiting)):
@@ -123,3 +118,10 @@ def iterate_results(
     finally:
         for future in waiting:
             future.cancel()
+
+
+def _require_survival(key: str, losses: int) -> None:
+    """Raise RigtwinError if too many workers have died over one job."""
+    if losses >= MOST_LOSSES:
+        causes = "out of memory, killed, or it could not start"
+        raise RigtwinError(f"a worker died {MOST_LOSSES} times over {key}: {causes}") from None

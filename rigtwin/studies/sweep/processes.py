@@ -39,6 +39,7 @@ def _set_up(folder: str) -> None:
     def follow_parent() -> None:
         if parent is not None:
             parent.join()
+        # sys.exit would end only this thread; os._exit ends the process without clean-up.
         os._exit(1)
 
     threading.Thread(target=follow_parent, daemon=True).start()

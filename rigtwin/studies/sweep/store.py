@@ -58,6 +58,7 @@ class Store:
         self.path = path
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
+            # Autocommit: each result is a transaction of its own.
             self._base = sqlite3.connect(path, isolation_level=None, timeout=0.2)
             # Exclusive from here on. A write-ahead log survives a killed program, and needs no
             # flush to disk at each result.

@@ -72,10 +72,7 @@ class Bench:
         )
 
     def run(
-        self,
-        base: Configuration,
-        candidates: Sequence[Settings],
-        scenarios: Sequence[Scenario],
+        self, base: Configuration, candidates: Sequence[Settings], scenarios: Sequence[Scenario]
     ) -> list[list[dict[str, float]]]:
         """Simulate every candidate in every scenario.
 

@@ -180,6 +180,7 @@ def _change(
     before, after = (np.array([pair[side][measure.name] for pair in pairs]) for side in (0, 1))
     # Pairing removes the scatter between roads: the median is that of the changes, not the change
     # of the medians.
+    # A change in percent needs a positive figure to relate to in every scenario.
     relative = not measure.more and bool(np.all(before > 0.0))
     change = 100.0 * (after / before - 1.0) if relative else after - before
     worse = change < 0.0 if measure.more else change > 0.0

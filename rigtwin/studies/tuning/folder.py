@@ -71,6 +71,7 @@ def write(folder: Path, result: TuningResult, twin: Configuration) -> list[Path]
             pages[f"tuned-{point + 1}.toml"] = text.toml(result, point)
     try:
         folder.mkdir(parents=True, exist_ok=True)
+        # Files of an earlier study with more points would pass for results of this one.
         for old in (*folder.glob("tuned*.toml"), *(folder / f"{name}.png" for name in CAPTIONS)):
             old.unlink(missing_ok=True)
         for name, content in pages.items():
@@ -122,9 +123,7 @@ def _held_out(result: TuningResult) -> str:
     """Return the table of comparisons, one line per measure."""
     spreads = [f"{when}_{what}" for when in ("before", "after") for what in ("median", "5%", "95%")]
     names = ["rig", "settings", "against", "measure", "unit", *spreads]
-    rows: list[list[object]] = [
-        [*names, "change", "low", "high", "change_in", "no_worse", "runs"],
-    ]
+    rows: list[list[object]] = [[*names, "change", "low", "high", "change_in", "no_worse", "runs"]]
     for comparison in (*result.comparisons, *result.front_comparisons):
         rows += _rows(comparison)
     return _csv(rows)

@@ -74,6 +74,7 @@ class FormulaFigure:
         # A formula without inputs still needs a signal of the test's length.
         values = formula(self.text, {}).replayed({}, inputs or [time], trial.period)
         figure = STATISTICS[self.statistic](values[trial.first :])
+        # Overflows count as trips do: the candidate has no score.
         return figure if math.isfinite(figure) else math.nan
 
 

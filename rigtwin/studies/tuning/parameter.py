@@ -56,6 +56,7 @@ class TuningParameter:
         if self.logarithmic:
             # Equal shares are equal ratios on a logarithmic scale.
             value = self.low * (self.high / self.low) ** share
+        # Rounding may leave the bounds by half a digit.
         return min(max(float(f"{value:.{DIGITS - 1}e}"), self.low), self.high)
 
     def share(self, value: float) -> float:
@@ -73,9 +74,7 @@ def values_at(parameters: Sequence[TuningParameter], shares: Array) -> tuple[flo
 
 
 def set_values(
-    settings: Settings,
-    parameters: Sequence[TuningParameter],
-    values: Sequence[float],
+    settings: Settings, parameters: Sequence[TuningParameter], values: Sequence[float]
 ) -> Settings:
     """Return the controller's settings with one value set per parameter."""
     pairs = zip(parameters, values, strict=True)

@@ -40,6 +40,7 @@ def plot_search(result: TuningResult) -> Figure:
         violating = {"color": NEUTRAL, "markersize": 4, "label": "violates a constraint"}
         axis.plot(number[~allowed], figures[~allowed], "x", **violating)
         axis.plot(number[allowed], figures[allowed], ".", color=SENSED, label="allowed")
+        # The running minimum is one of costs, of which less is better.
         sign = -1.0 if measure.more else 1.0
         costs = np.where(allowed & np.isfinite(figures), sign * figures, np.inf)
         # Running minimum of the cost; infinite until the first allowed candidate.
@@ -116,6 +117,8 @@ def _plot_points(axis: Axes, result: TuningResult) -> None:
         axis.annotate(number, (x.median, y.median), fontsize=8, **place)
     axis.axhline(0.0, color=NEUTRAL, linewidth=0.8)
     axis.axvline(0.0, color=NEUTRAL, linewidth=0.8)
+    # A change is in percent where all scenarios have positive figures, else in the measure's
+    # unit.
     labels = []
     for measure in (first, second):
         relative = any(point.change_of(measure.name).relative for point in compared)

@@ -193,6 +193,7 @@ def _are_same(study: Study, rig: UncertainRig) -> bool:
     """Return whether neither road nor rig differs between two scenarios."""
     configuration, demands = study.search_configuration, study.experiment.demands
     scenarios = draw_scenarios(study, rig, 2, APART)
+    # Demands that ignore the seed give the same road in both.
     first, second = (demands(configuration, seed) for seed in (0, APART))
     pairs = [(first, second)]
     if isinstance(first, Mapping):

@@ -135,6 +135,7 @@ def figures_of_joints(machine: Machine, job: Run, demands: Mapping[str, Array]) 
         LIMITS: largest_reach(machine, job.configuration, columns),
         TRIP: float(trip is not None),
     }
+    # Figures of an aborted test are of a shorter one, and would look better than complete ones.
     if trip is not None:
         return result | _no_measures(job)
     return result | _measure(job, Trial(job.configuration, columns, _first(job)))

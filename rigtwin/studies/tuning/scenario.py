@@ -88,6 +88,7 @@ def draw_scenarios(study: Study, rig: UncertainRig, count: int, first: int) -> l
     tolerances = study.machine.tolerances if study.variation.tolerances else ()
 
     def draw(seed: int) -> Scenario:
+        # A stream of its own beside the twin's noise, which has the same seed.
         random = np.random.default_rng([seed, 3])
         configuration = rig.draw(study.configuration, random)
 
@@ -103,6 +104,7 @@ def draw_scenarios(study: Study, rig: UncertainRig, count: int, first: int) -> l
             configuration = shift(f"{tolerance.group}.{tolerance.parameter}", width)
         for key, share in study.variation.shares.items():
             configuration = shift(key, value_of(configuration, key) * share)
+        # Certain values come last, so that neither uncertainty nor tolerances change them.
         return Scenario(seed, override(configuration, rig.certain).plant)
 
     return [draw(seed) for seed in range(first, first + count)]

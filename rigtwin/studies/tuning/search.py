@@ -126,10 +126,7 @@ class TuningSearch:
         return lost, score.limits - goals.limits, *beyond
 
     def minimise(
-        self,
-        objective: Measure,
-        evaluations: int,
-        within: tuple[Measure, float] | None = None,
+        self, objective: Measure, evaluations: int, within: tuple[Measure, float] | None = None
     ) -> Candidate | None:
         """Search for the best allowed candidate, starting from those already tried.
 
@@ -217,6 +214,7 @@ class _Problem:
 
     def costs(self, shares: Array) -> Array:
         """Return the costs at shares of shape (parameters, candidates), or (parameters,)."""
+        # scipy asks for the costs of an empty set if all candidates violate constraints.
         return self._rate(shares, lambda c: [self.cost(c)])[0] if shares.size else np.empty(0)
 
     def excesses(self, shares: Array) -> Array:
@@ -307,6 +305,7 @@ def find_front(search: TuningSearch) -> tuple[Candidate, ...]:
     budget, between = search.study.budget.evaluations // 3, search.study.budget.points - 2
     ends = [_minimise(search, objective, budget) for objective in (first, second)]
     low, high = (end.score.figures[second.name] for end in ends)
+    # The ends are known already.
     for bound in np.linspace(low, high, between + 2)[1:-1].tolist():
         search.minimise(first, max(budget // between, 1), (second, bound))
     _check_sensitivity(search)

@@ -155,6 +155,8 @@ class Study:
     @property
     def baseline_settings(self) -> Any:
         """Settings of the baseline controller, a NamedTuple."""
+        # Changes apply to the study's configuration, so the baseline shares all its other
+        # settings.
         return override(self.configuration, self.baseline_changes).controller
 
     @property

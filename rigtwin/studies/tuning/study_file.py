@@ -27,19 +27,9 @@ from rigtwin.studies.tuning.study import Budget, Changes, Constraint, Goals, Stu
 BASELINE = "baseline"
 REQUIRED = ("experiment", "minimise", "parameters")
 KEYS = (
-    *(
-        "title",
-        "machine",
-        "experiment",
-        "from",
-        "roads",
-        "held_out",
-        "quantile",
-        "evaluations",
-        "points",
-    ),
-    *("minimise", "report", "set", "search", "baseline", "parameters", "constraints", "vary"),
-    *("judge", "measures"),
+    *("title", "machine", "experiment", "from", "roads", "held_out", "quantile", "evaluations"),
+    *("points", "minimise", "report", "set", "search", "baseline", "parameters"),
+    *("constraints", "vary", "judge", "measures"),
 )
 MOST = 10_000
 """Maximum number of scenarios. Fewer than six have no 95 % interval of their median."""
@@ -98,10 +88,7 @@ def _machine(path: Path, tables: Mapping[str, Any]) -> Machine:
 
 
 def parse_study(
-    name: str,
-    tables: Mapping[str, Any],
-    machine: Machine,
-    overrides: Changes | None = None,
+    name: str, tables: Mapping[str, Any], machine: Machine, overrides: Changes | None = None
 ) -> Study:
     """Return the study described by TOML tables.
 
