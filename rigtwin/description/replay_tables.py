@@ -72,6 +72,8 @@ class Replays:
         """Return the replay of one table, or None if it has mistakes, which are noted."""
         before = len(self._mistakes)
         self._mistakes.unknown(where, table, ("name", "moved_by", "observe", "band", "free"))
+        if not isinstance(table.get("name", ""), str):
+            self._mistakes.note(where, f"name = {table['name']}: expected a text, in quotes")
         movers = self._read_movers(where, table)
         rows = [
             row

@@ -31,7 +31,7 @@ from rigtwin.importing.timing import (
     require_plausible,
     resample,
 )
-from rigtwin.importing.units import is_unit, unit_of
+from rigtwin.importing.units import QUANTITIES, is_unit, unit_of
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Writer
 
@@ -116,8 +116,9 @@ def convert(
     """
     recordable(forbid_overwriting(out, *_files(data, mapping)))
     wanted = load(mapping)
-    imported = read_channels(data, wanted)
-    return [*imported.report, _write(out, wanted, _machine(wanted, machine), imported)]
+    described = _machine(wanted, machine)
+    imported = read_channels(data, wanted, described)
+    return [*imported.report, _write(out, wanted, described, imported)]
 
 
 def convert_episodes(
@@ -158,7 +159,7 @@ def convert_episodes(
     for episode in episodes:
         out = folder / f"{episode.name}{ENDING}"
         try:
-            imported = _channels(label, episode.columns, wanted)
+            imported = _channels(label, episode.columns, wanted, described)
             line = _write(recordable(out), wanted, described, imported)
         except RigtwinError as error:
             errors.append(error)
@@ -193,7 +194,7 @@ def read_columns(data: Data, selection: Selection = EVERYTHING) -> Columns:
     return join({path.stem: read(path, selection.of_file(path.stem)) for path in data})
 
 
-def read_channels(data: Data, wanted: Map) -> Imported:
+def read_channels(data: Data, wanted: Map, machine: Machine | None = None) -> Imported:
     """Return the channels that a map makes of another program's data.
 
     Parameters
@@ -202,6 +203,8 @@ def read_channels(data: Data, wanted: Map) -> Imported:
         Files, which are put side by side, row by row; or data in memory, see `read_frame`.
     wanted
         Map from columns to channels.
+    machine
+        Machine whose units the channels must have. Defaults to the shipped one that the map names.
 
     Returns
     -------
@@ -222,7 +225,7 @@ def read_channels(data: Data, wanted: Map) -> Imported:
             f"[episodes] take = [{episodes[0].number}]"
         )
     header = _header(label, columns)
-    imported = _channels(label, episodes[0].columns if episodes else columns, wanted)
+    imported = _channels(label, episodes[0].columns if episodes else columns, wanted, machine)
     return replace(imported, report=(*header, *imported.report))
 
 
@@ -277,7 +280,7 @@ def _header(label: str, columns: Columns) -> list[str]:
     return [f"{label}: {columns.form}; {columns.rows} rows, columns {names}", *columns.notes]
 
 
-def _channels(label: str, columns: Columns, wanted: Map) -> Imported:
+def _channels(label: str, columns: Columns, wanted: Map, machine: Machine | None) -> Imported:
     """Return the channels of one test."""
     report: list[str] = []
     try:
@@ -288,6 +291,7 @@ def _channels(label: str, columns: Columns, wanted: Map) -> Imported:
         signals: Signals = {
             name: _signal(columns, name, each, report) for name, each in inputs.items()
         }
+        _require_units(columns, wanted, inputs, _units(wanted, machine))
         report += _notes(columns, inputs)
         report += _time_notes(columns, wanted)
         time = _time(columns, wanted, signals)
@@ -350,6 +354,33 @@ def _signal(columns: Columns, name: str, asked: Column, report: list[str]) -> Ar
     if bridged:
         report.append(f"{name}: {bridged} rows lie between both ends of the counter; bridged")
     return factor * values
+
+
+def _units(wanted: Map, machine: Machine | None) -> Mapping[str, str]:
+    """Return the units of the machine's channels; none for a machine that is unknown here."""
+    if machine is None and wanted.machine in catalogue.shipped():
+        machine = catalogue.find(wanted.machine)
+    return {} if machine is None else machine.units
+
+
+def _require_units(
+    columns: Columns, wanted: Map, inputs: Mapping[str, Column], units: Mapping[str, str]
+) -> None:
+    """Raise RigtwinError for a column in a unit of another quantity than its channel's.
+
+    A scale converts quantities, such as volts to newtons, so channels with one are not checked.
+    """
+    for channel, source in wanted.channels.items():
+        name = ".".join(channel)
+        if source.column is None or source.scale != 1.0 or name not in units:
+            continue
+        said = inputs[name].unit or columns.units.get(inputs[name].name)
+        quantity = unit_of(said)[0] if said else "1"
+        if units[name] in QUANTITIES and quantity not in ("1", units[name]):
+            raise RigtwinError(
+                f"{name} is in {said!r}; expected a unit of {units[name]}, as the machine has it, "
+                "or a scale that converts it"
+            )
 
 
 def _notes(columns: Columns, inputs: Mapping[str, Column]) -> list[str]:

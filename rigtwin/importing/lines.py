@@ -69,3 +69,14 @@ def read_lines(path: Path, encoding: str) -> Iterator[str]:
         text = io.TextIOWrapper(cast(Any, file), encoding, errors="replace")
         for line in text:
             yield from line.splitlines()
+
+
+def is_cut_off(path: Path, encoding: str) -> bool:
+    """Return whether a text file ends within a line. A compressed file counts as complete, since
+    gzip states its length."""
+    if path.suffix.lower() == ".gz":
+        return False
+    width = 2 if encoding == "utf-16" else 1
+    with path.open("rb") as file:
+        file.seek(-width, io.SEEK_END)
+        return file.read().strip(b"\0") not in (b"\n", b"\r")
