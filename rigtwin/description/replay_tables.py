@@ -274,9 +274,12 @@ class Replays:
                 return None
             return Row(name, SENSED[self._components.types[name]], known.channel, known.unit)
         if control is not None and name in control.outputs:
-            unit = next(
-                c.unit for c in self._components.by_name.values() if c.channel == ("/command", name)
-            )
+            channel = ("/command", name)
+            units = [c.unit for c in self._components.by_name.values() if c.channel == channel]
+            if not units:
+                # The missing actuator has a mistake of its own.
+                return None
+            unit = units[0]
             return Row(name, "command", ("/command", name), unit or "1")
         observable = [*sensors, *(control.outputs if control else ())]
         self._mistakes.note(
