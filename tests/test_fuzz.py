@@ -123,7 +123,7 @@ def test_a_damaged_recording_is_refused_or_read_without_a_wrong_value(tmp_path):
             ticks = np.round(recording.time / 1e-3).astype(int)
             assert np.array_equal(recording["/sensor.force"], FORCE[ticks])
 
-    fuzz(law, damages(len(whole)), 80)
+    fuzz(law, damages(len(whole)), 40)
 
 
 # Imports
