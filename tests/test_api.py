@@ -202,7 +202,7 @@ def test_experiments_and_controllers_of_ones_own_run_a_described_machine(tmp_pat
             "None: expected a recording, or the path of one",
         ),
         (lambda rig: rigtwin.compare(wrong(3)), "3: expected a recording, or the path of one"),
-        (lambda rig: rigtwin.load(wrong(5)), "5: expected the path of a recording"),
+        (lambda rig: rigtwin.load(wrong(5)), "path 5: expected text or a path"),
         (lambda rig: rigtwin.run(wrong(5), "drop"), "5: expected a machine, its name"),
         (lambda rig: rigtwin.run(rig, wrong(5)), "experiment 5: expected a name, or a function"),
         (
@@ -222,7 +222,7 @@ def test_experiments_and_controllers_of_ones_own_run_a_described_machine(tmp_pat
             lambda rig: rigtwin.run(rig, "drop", effects=["coulomb@rail=60"], effects_from=1e9),
             "the test is over at",
         ),
-        (lambda rig: rigtwin.stability("car", tau=wrong("x")), "tau = 'x': expected a number"),
+        (lambda rig: rigtwin.stability("car", tau=wrong("x")), "tau 'x': expected a number"),
         (lambda rig: rigtwin.stability(wrong(5)), "vehicle 5: expected a name"),
         (lambda rig: rigtwin.rths(1, noise=wrong(-1)), "noise -1: expected a Noise"),
         (

@@ -72,7 +72,7 @@ WRONG: list[tuple[str, tuple[object, ...], dict[str, object], str]] = [
     ("diagnose", (5,), {}, "5: expected a recording"),
     ("diagnose", ("a\0b",), {}, "without a null character"),
     ("load", ("a\0b",), {}, "without a null character"),
-    ("load", (5,), {}, "5: expected the path of a recording"),
+    ("load", (5,), {}, "path 5: expected text or a path"),
     ("stability", ("truck",), {"changes": 5}, "changes 5: expected a table or None"),
     ("run", ("suspension-rig", "drop"), {"settings": 5}, "settings 5"),
     ("run", ("suspension-rig", "drop"), {"path": 5}, "path 5: expected text, a path or None"),

@@ -18,7 +18,7 @@ CHANNEL = Channel(id=1, topic="/odd", message_encoding="json", metadata={}, sche
 def columns(data: list[bytes]) -> dict[str, list[float]]:
     return {
         name: values.tolist()
-        for name, values in decode_columns(Path("f.mcap"), CHANNEL, None, data).items()
+        for name, values in decode_columns(Path("f.mcap"), CHANNEL, None, data, []).items()
     }
 
 

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import socket
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -215,6 +218,107 @@ def test_what_a_client_must_not_do_is_said(sizes: list[int], message: object, sa
         with pytest.raises(RigtwinError, match="no client at port"):
             server.wait(0.5)
         assert said in server.fault
+
+
+def test_a_displacement_that_is_given_again_before_its_force_is_no_new_target() -> None:
+    """The requests of two steps of OpenSees 3.7.1: it gives each displacement before and after the
+    commit. Twenty ticks then pass between the forces of two steps, instead of ten."""
+    with (
+        served(waits=True, latest=5.0) as (model, server),
+        socket.create_connection(("127.0.0.1", server.port)) as link,
+    ):
+        link.sendall(np.array([1, 0, 0, 0, 0, 0, 0, 0, 1, 0, 2], np.int32).tobytes())
+        forces = []
+        requests = [(3, 0.0), (3, 0.0), (10, 0.0)]
+        for place in (1e-3, 1e-3, 2e-3):
+            requests += [(3, place), (5, place), (3, place), (10, place)]
+
+        def ask() -> None:
+            for request in requests:
+                link.sendall(np.array(request).tobytes())
+                if request[0] == 10:
+                    forces.append(np.frombuffer(link.recv(16))[0])
+
+        client = threading.Thread(target=ask)
+        client.start()
+        # The force of a tick is its number.
+        for tick in range(4 * STEP):
+            model.advance(float(tick), PERIOD)
+        client.join(5.0)
+        assert not client.is_alive()
+    assert np.diff(np.abs(forces)).tolist() == pytest.approx([STEP] * 3, abs=1.0)
+
+
+STRUCTURE = """
+import json, sys
+import openseespylinux.opensees as ops
+ops.model("basic", "-ndm", 2, "-ndf", 2)
+ops.node(1, 0.0, 0.0)
+ops.fix(1, 1, 0)
+ops.node(2, 0.0, 0.0)
+ops.fix(2, 1, 1)
+ops.mass(1, 100.0, 100.0)
+ops.uniaxialMaterial("Elastic", 1, 4000.0)
+ops.element("zeroLength", 1, 2, 1, "-mat", 1, "-dir", 2)
+ops.element("genericClient", 2, "-node", 1, "-dof", 2, "-server", int(sys.argv[1]), "127.0.0.1")
+ops.timeSeries("Constant", 1)
+ops.pattern("Plain", 1, 1)
+ops.load(1, 0.0, -50.0)
+ops.constraints("Plain")
+ops.numberer("Plain")
+ops.system("FullGeneral")
+ops.algorithm("Linear")
+ops.integrator("CentralDifference")
+ops.analysis("Transient")
+places = []
+for _ in range(100):
+    assert ops.analyze(1, 0.01) == 0
+    places.append(ops.nodeDisp(1, 2))
+print(json.dumps(places))
+"""
+"""A mass of 100 kg on a spring of 4000 N/m under 50 N, and the rig beside it."""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("gone", ["nobody", "client", "server"])
+def test_opensees_itself_moves_a_spring_in_the_rig_s_place(tmp_path, gone) -> None:
+    probe = [sys.executable, "-c", "import openseespylinux.opensees"]
+    if subprocess.run(probe, capture_output=True).returncode:
+        pytest.skip("needs openseespy, and its libraries libblas3 and liblapack3")
+    script = tmp_path / "structure.py"
+    script.write_text(STRUCTURE)
+    stiffness, ticks, place = 6000.0, 0, NOMINAL.start
+    with served(waits=True, latest=2.0) as (model, server):
+        command = [sys.executable, str(script), str(server.port)]
+        client = subprocess.Popen(
+            command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=tmp_path
+        )
+        try:
+            server.wait(30.0)
+            while client.poll() is None and ticks < 2000 and model.late == 0:
+                if ticks == 300 and gone == "client":
+                    client.kill()
+                if ticks == 300 and gone == "server":
+                    server.close()
+                    break
+                place = model.advance(-stiffness * (place - NOMINAL.start), PERIOD)
+                ticks += 1
+        except LateModel:
+            assert gone == "client"
+        finally:
+            if gone != "nobody":
+                client.kill()
+            told, _ = client.communicate(timeout=30.0)
+    if gone != "nobody":
+        assert 300 <= ticks < 400
+        return
+    # A step of 10 ms takes ten ticks.
+    assert ticks == pytest.approx(100 * STEP, abs=3 * STEP)
+    moved = np.array(json.loads(told.splitlines()[-1]))
+    time_of = 0.01 * np.arange(1, 101)
+    exact = -50.0 / (4000.0 + stiffness) * (1.0 - np.cos(10.0 * time_of))
+    # Central differences with steps of 10 ms at 10 rad/s, begun without the first acceleration.
+    assert np.max(np.abs(moved - exact)) < 0.05 * np.max(np.abs(exact))
 
 
 def test_a_port_that_is_taken_is_said() -> None:

@@ -21,9 +21,10 @@ from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq import CARD
 from rigtwin.hardware.daq.table_file import load_table
 from rigtwin.hardware.daq.wired import WiredTwin
+from rigtwin.hardware.faults import outcome as outcomes
 from rigtwin.hardware.faults.campaign import draw_faults, try_fault
 from rigtwin.hardware.faults.kinds import KINDS
-from rigtwin.hardware.faults.outcome import read_final_cause
+from rigtwin.hardware.faults.outcome import InjectedFault, read_final_cause
 from rigtwin.hardware.faults.processes import FaultNotReached, try_process_fault
 from rigtwin.hardware.session.record import open_virtual_card, record_unpaced
 from rigtwin.hardware.session.stops import stop_requests
@@ -242,6 +243,36 @@ def test_every_kind_of_fault_stops_the_rig(tmp_path, kind, seed):
     [fault] = draw_faults(1, seed, [kind])
     outcome = try_fault(fault, find(fault.experiment), TABLE, tmp_path)
     assert outcome.ok, outcome
+
+
+@pytest.mark.parametrize(
+    ("kind", "experiment", "at", "place", "seed", "cause"),
+    [
+        # The force changes by 100 N before the load cell has repeated a reading seven times.
+        ("stuck", "imposed-fast", 2732, 3, 36166931, "motor"),
+        # The cylinder creeps to the command at which its valve stuck, which nobody can measure.
+        ("valve stuck", "road1.6", 1583, 1, 1179248456, "following"),
+    ],
+)
+def test_a_fault_counts_as_visible_where_its_measurements_are_implausible(
+    tmp_path, kind, experiment, at, place, seed, cause
+):
+    [kind] = [each for each in KINDS if each.name == kind]
+    fault = InjectedFault(kind, experiment, at, place, seed)
+    outcome = try_fault(fault, find(experiment), TABLE, tmp_path)
+    assert outcome.cause == cause
+    assert outcome.late is not None
+    assert outcome.late <= 5
+    assert outcome.ok, outcome
+
+
+def test_blaming_the_load_cell_for_another_sensor_is_wrong(tmp_path, monkeypatch):
+    [kind] = [each for each in KINDS if each.name == "stuck"]
+    fault = InjectedFault(kind, "imposed-fast", 2732, 3, 36166931)
+    experiment = find(fault.experiment)
+    assert try_fault(fault, experiment, TABLE, tmp_path).right
+    monkeypatch.setattr(outcomes, "SIGNALS", ("load_cell", "", "", "ground_lvdt"))
+    assert not try_fault(fault, experiment, TABLE, tmp_path).right
 
 
 def test_who_interrupts_a_campaign_fails_no_session(tmp_path, monkeypatch, capsys):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import inspect
 from collections.abc import Callable, Mapping, Sequence
 from functools import wraps
@@ -26,9 +27,9 @@ NAMES = {
 def check_arguments(function: Function) -> Function:
     """Decorate a function so that arguments of a wrong type raise one clear line.
 
-    Arguments are compared with the annotations only after the function has failed, so that a
-    successful call costs nothing. Truth values are the exception: Python accepts them as numbers,
-    so they are checked before the call.
+    Numbers, texts, paths and functions are compared with the annotations before the call: a wrong
+    one might be used only after minutes of work, and Python accepts truth values as numbers. Other
+    types accept whatever behaves alike, so they are compared only after the function has failed.
 
     Parameters
     ----------
@@ -44,8 +45,7 @@ def check_arguments(function: Function) -> Function:
 
     @wraps(function)
     def checked(*values: Any, **keywords: Any) -> Any:
-        truths = any(isinstance(value, bool) for value in (*values, *keywords.values()))
-        if truths and (mistake := _mistake(function, values, keywords)) is not None:
+        if (mistake := _mistake(function, values, keywords, _is_plain)) is not None:
             raise RigtwinError(mistake)
         try:
             return function(*values, **keywords)
@@ -53,6 +53,10 @@ def check_arguments(function: Function) -> Function:
             mistake = _mistake(function, values, keywords)
             if mistake is None:
                 raise
+        except OSError as error:
+            if error.errno != errno.ENAMETOOLONG:
+                raise
+            mistake = f"{str(error.filename)[:60]}…: {error.strerror}"
         raise RigtwinError(mistake)
 
     # Pickle looks a function up by module and name, and the decorated one is an attribute of the
@@ -61,10 +65,25 @@ def check_arguments(function: Function) -> Function:
     return checked  # type: ignore[return-value]
 
 
+def _is_plain(value: Any, expected: Any) -> bool:
+    """Return whether an argument is checked before the call: a truth value, or an argument that
+    must be a number, a text, a path or a function."""
+    options = get_args(expected) if get_origin(expected) in (Union, UnionType) else (expected,)
+    return isinstance(value, bool) or all(
+        option in NAMES or option is None or get_origin(option) is Callable for option in options
+    )
+
+
 def _mistake(
-    function: Callable[..., Any], values: Sequence[Any], keywords: Mapping[str, Any]
+    function: Callable[..., Any],
+    values: Sequence[Any],
+    keywords: Mapping[str, Any],
+    is_checked: Callable[[Any, Any], bool] = lambda *_: True,
 ) -> str | None:
-    """Return a line about the first argument of a wrong type, or None."""
+    """Return a line about the first argument of a wrong type, or None.
+
+    `is_checked` says of a value and its expected type whether they are compared.
+    """
     signature = inspect.signature(function)
     try:
         arguments = signature.bind(*values, **keywords).arguments
@@ -77,7 +96,7 @@ def _mistake(
         if parameter.kind in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD):
             continue
         expected = _evaluate(parameter.annotation, namespace)
-        if not fits(value, expected):
+        if is_checked(value, expected) and not fits(value, expected):
             return f"{name} {value!r:.60}: expected {describe(expected)}"
         # A null character would end the path in the system's calls, and names another file.
         if isinstance(value, str | Path) and "\0" in str(value):

@@ -1,4 +1,4 @@
-"""Files on a command line: no output may be an input, or another output."""
+"""Files on a command line: no output may be an input, or another output, or impossible to write."""
 
 from __future__ import annotations
 
@@ -7,15 +7,17 @@ from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 
+from rigtwin.console import writable
 from rigtwin.errors import RigtwinError
 from rigtwin.files import forbid_overwriting
 
 OUTPUTS = ("out", "json", "html", "pdf", "png", "draw", "save_twin", "save_mjcf")
-"""Options that name a file to be written."""
+"""Options that name a file to be written; `out` names a folder in some commands."""
 
 
 def check_files(parsed: argparse.Namespace) -> None:
-    """Raises RigtwinError if writing one of a command's files would lose another."""
+    """Raises RigtwinError, before the work for them is done, if one of a command's files cannot be
+    written or if writing it would lose another."""
     arguments = vars(parsed)
     outputs = {name: path for name in OUTPUTS if isinstance(path := arguments.get(name), Path)}
     read = [value for name, value in arguments.items() if name not in outputs]
@@ -28,6 +30,8 @@ def check_files(parsed: argparse.Namespace) -> None:
     for name, path in outputs.items():
         option = f"--{name.replace('_', '-')}"
         forbid_overwriting(path, *inputs)
+        if name != "out":
+            writable(path)
         if (first := seen.setdefault(path.resolve(), option)) != option:
             raise RigtwinError(f"{first} and {option} are both {path}; one would be lost")
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
+from keyword import iskeyword
 from typing import Any
 
 from rigtwin import components
@@ -119,9 +120,12 @@ class Components:
         if not isinstance(table, Mapping):
             self.mistakes.note(where, "expected a table")
             return
-        if not NAME.fullmatch(name) or name in RESERVED:
+        if not NAME.fullmatch(name) or name in RESERVED or iskeyword(name):
+            taken = f", and none of {', '.join(RESERVED)}, and no keyword of Python"
             self.mistakes.note(
-                where, f"{name!r} cannot be a component's name; expected letters, digits and _"
+                where,
+                f"{name[:40]!r} cannot be a component's name; expected letters, digits and _"
+                + (taken if NAME.fullmatch(name) else ""),
             )
             return
         # What the component stands for decides everything else, so reading ends without it.

@@ -24,6 +24,8 @@ from rigtwin.files import parse_toml
 
 TABLES = ("machine", "components", "controller", "replays", "mains", "experiments", "limits")
 """Tables of a description."""
+LONGEST_PATH = 1000
+"""Largest number of characters of the model's path."""
 
 
 def load(path: Path) -> Machine:
@@ -156,6 +158,8 @@ class _Reader:
         # The name becomes part of file names and of topics in recordings.
         elif "name" in about and not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]*", name):
             note("[machine] name", f"{name!r}: expected letters, digits, - and _")
+        if not isinstance(about.get("title", ""), str):
+            note("[machine] title", f"{str(about['title'])[:40]}: expected a text, in quotes")
         nominal = about.get("nominal", "rough")
         if nominal not in PRIORS:
             note("[machine] nominal", f"{str(nominal)[:40]!r}: expected {' or '.join(PRIORS)}")
@@ -242,6 +246,11 @@ class _Reader:
         if not isinstance(about.get("model"), str):
             if "model" in about:
                 self._mistakes.note("[machine] model", "expected the name of an MJCF file")
+            return None
+        if len(about["model"]) > LONGEST_PATH:
+            self._mistakes.note(
+                "[machine] model", f"{about['model'][:40]}…: expected the name of an MJCF file"
+            )
             return None
         try:
             return Mechanism(self._model_path(about))

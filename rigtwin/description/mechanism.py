@@ -130,6 +130,11 @@ class Mechanism:
             # MuJoCo's messages have several lines; ours have one.
             raise RigtwinError(f"model {path}: {' '.join(str(error).split())}") from None
         check_values(path, self.model)
+        try:
+            mujoco.mj_forward(self.model, mujoco.MjData(self.model))
+        except mujoco.FatalError as error:
+            # Such as contacts of more bodies than fit into MuJoCo's memory.
+            raise RigtwinError(f"model {path}: {' '.join(str(error).split())}") from None
 
     def names(self, element: str) -> list[str]:
         """Return the names of all elements of a kind; elements without a name are left out."""

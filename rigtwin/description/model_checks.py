@@ -16,6 +16,10 @@ from rigtwin.errors import RigtwinError
 
 MOST_COPIES = 10_000
 """Largest number of elements that `replicate`, `flexcomp` and `composite` may make."""
+MOST_CELLS = 10_000_000
+"""Largest number of cells of a height field, or of pixels of a generated texture."""
+CELLS = {"hfield": ("nrow", "ncol"), "texture": ("width", "height")}
+"""Element → attributes whose product is the number of its cells."""
 MOST_RESERVED = 10_000_000
 """Largest value of an attribute of `size`, except memory."""
 MOST_MEMORY = 4 * 2**30
@@ -112,6 +116,11 @@ def _check_file(path: Path, root: Path, copies: int, depth: int) -> None:
                     f"model {path}, line {parser.CurrentLineNumber}: {name} of <{tag}> is "
                     f"{value[:40]!r}; expected finite numbers"
                 )
+        cells = math.prod(_number(attributes.get(side, "1")) for side in CELLS.get(tag, ()))
+        if cells > MOST_CELLS:
+            raise RigtwinError(
+                f"model {path}: <{tag}> has {cells:g} cells; expected at most {MOST_CELLS}"
+            )
         if tag == "size":
             _check_size(path, attributes)
         if tag == "include" and "file" in attributes and depth > 0:

@@ -70,6 +70,8 @@ class Replays:
         """Return the replay of one table, or None if it has mistakes, which are noted."""
         before = len(self._mistakes)
         self._mistakes.unknown(where, table, ("name", "moved_by", "observe", "band", "free"))
+        if not isinstance(table.get("name", ""), str):
+            self._mistakes.note(where, f"name = {table['name']}: expected a text, in quotes")
         movers = self._read_movers(where, table)
         rows = [
             row
@@ -273,9 +275,12 @@ class Replays:
                 return None
             return Row(name, SENSED[self._components.types[name]], known.channel, known.unit)
         if control is not None and name in control.outputs:
-            unit = next(
-                c.unit for c in self._components.by_name.values() if c.channel == ("/command", name)
-            )
+            channel = ("/command", name)
+            units = [c.unit for c in self._components.by_name.values() if c.channel == channel]
+            if not units:
+                # The missing actuator has a mistake of its own.
+                return None
+            unit = units[0]
             return Row(name, "command", ("/command", name), unit or "1")
         observable = [*sensors, *(control.outputs if control else ())]
         self._mistakes.note(

@@ -100,6 +100,7 @@ class GenericClientServer:
         if sizes[DISPLACEMENTS] != 1 or not 2 <= length <= MOST:
             wanted = f"{sizes[DISPLACEMENTS]} displacements in messages of {length} numbers"
             raise RigtwinError(f"a client with {wanted}: expected one in 2 to {MOST}")
+        last, felt = np.nan, True
         while True:
             message = np.frombuffer(_receive(connection, 8 * length), np.float64)
             # int() raises an error for NaN and infinity; 0 is no request, and is refused like one
@@ -109,6 +110,10 @@ class GenericClientServer:
             if asked == TRIAL:
                 if not np.isfinite(message[1]):
                     raise RigtwinError("a client gave a displacement that is not a number")
+                # OpenSees gives a step's displacement twice, before and after it commits the step.
+                if message[1] == last and not felt:
+                    continue
+                last, felt = message[1], False
                 # The model is closed once the rig's loop has ended.
                 if not self._model.give(self._start + float(message[1])):
                     return
@@ -120,6 +125,7 @@ class GenericClientServer:
                     return
                 # The client's equations have the restoring force on the side of the resistance.
                 reply[0] = -force
+                felt = True
                 connection.sendall(reply.tobytes())
             elif asked in MATRICES:
                 connection.sendall(reply.tobytes())

@@ -22,7 +22,7 @@ from rigtwin.importing.timing import (
     require_plausible,
     resample,
 )
-from rigtwin.importing.units import is_unit, unit_of
+from rigtwin.importing.units import QUANTITIES, is_unit, unit_of
 from rigtwin.numerics.arrays import Array
 
 LARGEST = 1e15
@@ -53,8 +53,20 @@ class Imported:
     report: tuple[str, ...]
 
 
-def make_channels(label: str, columns: Columns, wanted: Map) -> Imported:
-    """Return the channels of one test."""
+def make_channels(label: str, columns: Columns, wanted: Map, units: Mapping[str, str]) -> Imported:
+    """Return the channels of one test.
+
+    Parameters
+    ----------
+    label
+        Name of the data, for messages.
+    columns
+        Columns of the data.
+    wanted
+        Map from columns to channels.
+    units
+        Channel → its unit in the machine, where it is known.
+    """
     report: list[str] = []
     try:
         inputs = {
@@ -64,6 +76,7 @@ def make_channels(label: str, columns: Columns, wanted: Map) -> Imported:
         signals: Signals = {
             name: _signal(columns, name, each, report) for name, each in inputs.items()
         }
+        _require_units(columns, wanted, inputs, units)
         report += _notes(columns, inputs)
         report += _time_notes(columns, wanted)
         time = _time(columns, wanted, signals)
@@ -132,6 +145,26 @@ def _signal(columns: Columns, name: str, asked: Column, report: list[str]) -> Ar
     if bridged:
         report.append(f"{name}: {bridged} rows lie between both ends of the counter; bridged")
     return factor * values
+
+
+def _require_units(
+    columns: Columns, wanted: Map, inputs: Mapping[str, Column], units: Mapping[str, str]
+) -> None:
+    """Raise RigtwinError for a column in a unit of another quantity than its channel's.
+
+    A scale converts quantities, such as volts to newtons, so channels with one are not checked.
+    """
+    for channel, source in wanted.channels.items():
+        name = ".".join(channel)
+        if source.column is None or source.scale != 1.0 or name not in units:
+            continue
+        said = inputs[name].unit or columns.units.get(inputs[name].name)
+        quantity = unit_of(said)[0] if said else "1"
+        if units[name] in QUANTITIES and quantity not in ("1", units[name]):
+            raise RigtwinError(
+                f"{name} is in {said!r}; expected a unit of {units[name]}, as the machine has it, "
+                "or a scale that converts it"
+            )
 
 
 def _notes(columns: Columns, inputs: Mapping[str, Column]) -> list[str]:

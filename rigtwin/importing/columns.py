@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -13,6 +14,8 @@ from rigtwin.numerics.arrays import Array
 
 MISSING = ("", "nan", "na", "n/a", "null", "none", "-", "#n/a", "inf", "-inf", "+inf")
 """Cells that hold no value, in small letters."""
+_THOUSANDS = re.compile(r"[+-]?\d{1,3}(\.\d{3})+,\d*([eE][+-]?\d+)?")
+"""Number with a decimal comma and dots between thousands."""
 
 
 @dataclass(frozen=True)
@@ -66,9 +69,10 @@ def is_missing(cell: str) -> bool:
 
 def number_of(cell: str, decimal: str) -> float:
     """Return the number in a cell. Raises ValueError for any other cell."""
-    # With a decimal comma, dots separate thousands; a cell with a dot alone is ambiguous.
+    # With a decimal comma, dots separate thousands; a cell with a dot alone is ambiguous, and
+    # "1,234.5" has its signs the other way round.
     if decimal == ",":
-        if "." in cell and "," not in cell:
+        if "." in cell and not _THOUSANDS.fullmatch(cell.strip()):
             raise ValueError(cell)
         cell = cell.replace(".", "").replace(",", ".")
     # float() accepts Python's "1_000", which no measuring program writes as a number.

@@ -76,8 +76,9 @@ def convert(
     # The output is checked before anything is read, which may take minutes.
     recordable(forbid_overwriting(out, *_files(data, mapping)))
     wanted = load(mapping)
-    imported = read_channels(data, wanted)
-    return [*imported.report, _write(out, wanted, _machine(wanted, machine), imported)]
+    described = _machine(wanted, machine)
+    imported = read_channels(data, wanted, described)
+    return [*imported.report, _write(out, wanted, described, imported)]
 
 
 def convert_episodes(
@@ -118,7 +119,7 @@ def convert_episodes(
         out = folder / f"{episode.name}{ENDING}"
         try:
             # One damaged episode must not lose the others.
-            imported = make_channels(label, episode.columns, wanted)
+            imported = make_channels(label, episode.columns, wanted, _units(wanted, described))
             line = _write(recordable(out), wanted, described, imported)
         except RigtwinError as error:
             errors.append(error)
@@ -155,7 +156,7 @@ def read_columns(data: Data, selection: Selection = EVERYTHING) -> Columns:
     return join({path.stem: read(path, selection.of_file(path.stem)) for path in data})
 
 
-def read_channels(data: Data, wanted: Map) -> Imported:
+def read_channels(data: Data, wanted: Map, machine: Machine | None = None) -> Imported:
     """Return the channels that a map makes of another program's data.
 
     Parameters
@@ -164,6 +165,8 @@ def read_channels(data: Data, wanted: Map) -> Imported:
         Files, which are put side by side, row by row; or data in memory, see `read_frame`.
     wanted
         Map from columns to channels.
+    machine
+        Machine whose units the channels must have. Defaults to the shipped one that the map names.
 
     Returns
     -------
@@ -184,7 +187,8 @@ def read_channels(data: Data, wanted: Map) -> Imported:
             f"[episodes] take = [{episodes[0].number}]"
         )
     header = _header(label, columns)
-    imported = make_channels(label, episodes[0].columns if episodes else columns, wanted)
+    units = _units(wanted, machine)
+    imported = make_channels(label, episodes[0].columns if episodes else columns, wanted, units)
     return replace(imported, report=(*header, *imported.report))
 
 
@@ -237,6 +241,13 @@ def _header(label: str, columns: Columns) -> list[str]:
     """Return the first lines of the report: what the data hold."""
     names = ", ".join(columns.names)
     return [f"{label}: {columns.form}; {columns.rows} rows, columns {names}", *columns.notes]
+
+
+def _units(wanted: Map, machine: Machine | None) -> Mapping[str, str]:
+    """Return the units of the machine's channels; none for a machine that is unknown here."""
+    if machine is None and wanted.machine in catalogue.shipped():
+        machine = catalogue.find(wanted.machine)
+    return {} if machine is None else machine.units
 
 
 def _write(out: Path, wanted: Map, machine: Machine | None, imported: Imported) -> str:

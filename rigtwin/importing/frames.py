@@ -52,7 +52,7 @@ def read_frame(data: object, selection: Selection) -> Columns:
             continue
         try:
             numbers, unit = _numbers(name, column, wrong)
-        except (TypeError, ValueError) as error:
+        except (TypeError, ValueError, OverflowError) as error:
             refused[name] = str(error).splitlines()[0] if str(error) else "it holds no numbers"
             continue
         values |= numbers
@@ -84,7 +84,10 @@ def _label(name: object) -> str:
 
 
 def _numbers(name: str, column: Any, wrong: dict[str, str]) -> tuple[dict[str, Array], str]:
-    """Return a column's numbers by name, and their unit. Raises TypeError or ValueError."""
+    """Return a column's numbers by name, and their unit. Raises TypeError, ValueError or
+    OverflowError."""
+    if isinstance(column, np.ma.MaskedArray):
+        column = _without_mask(column)
     try:
         array: Any = np.asarray(column)
     except ValueError:
@@ -94,6 +97,7 @@ def _numbers(name: str, column: Any, wrong: dict[str, str]) -> tuple[dict[str, A
     if array.dtype.kind in "Mm":
         return {name: _seconds(array)}, "s"
     if array.dtype.kind in "SU":
+        array = array.astype(str)
         cells = [str(cell) for cell in array]
         numbers, row = numbers_of(cells, ".")
         if not np.isfinite(numbers).any():
@@ -112,6 +116,17 @@ def _numbers(name: str, column: Any, wrong: dict[str, str]) -> tuple[dict[str, A
     items = array.reshape(len(array), -1)
     names = name_items(name, items.shape[1])
     return {item: np.ascontiguousarray(items[:, n]) for n, item in enumerate(names)}, ""
+
+
+def _without_mask(column: Any) -> Array:
+    """Return a masked array as a plain one that is not a number where the mask hides a value."""
+    if column.dtype.kind in "fiub":
+        return column.astype(float).filled(np.nan)
+    if column.dtype.kind in "Mm":
+        return column.filled(column.dtype.type("NaT"))
+    if np.ma.getmaskarray(column).any():
+        raise ValueError(f"it holds masked values of {column.dtype}, which is no number")
+    return column.data
 
 
 def _unpack(array: Array) -> Array:
@@ -138,7 +153,9 @@ def _seconds(array: Any) -> Array:
     if unit in ("Y", "M"):
         array, (unit, count) = array.astype("datetime64[D]"), ("D", 1)
     length = {"W": 604800.0, "D": 86400.0, "h": 3600.0, "m": 60.0, "s": 1.0, "ms": 1e-3}
-    length |= {"us": 1e-6, "ns": 1e-9, "ps": 1e-12}
+    length |= {"us": 1e-6, "ns": 1e-9, "ps": 1e-12, "fs": 1e-15, "as": 1e-18}
+    if unit not in length:
+        raise ValueError("it holds times without a unit; expected a type such as timedelta64[ns]")
     # NaT is the smallest integer here, and replaced in the next line.
     numbers = count * length[unit] * array.astype(np.int64).astype(float)
     numbers[np.isnat(array)] = np.nan

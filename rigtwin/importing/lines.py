@@ -74,3 +74,14 @@ def read_lines(path: Path, encoding: str) -> Iterator[str]:
             # Unlike the file's own iterator, splitlines also ends lines at form feeds and other
             # separators.
             yield from line.splitlines()
+
+
+def is_cut_off(path: Path, encoding: str) -> bool:
+    """Return whether a text file ends within a line. A compressed file counts as complete, since
+    gzip states its length."""
+    if path.suffix.lower() == ".gz":
+        return False
+    width = 2 if encoding == "utf-16" else 1
+    with path.open("rb") as file:
+        file.seek(-width, io.SEEK_END)
+        return file.read().strip(b"\0") not in (b"\n", b"\r")

@@ -189,7 +189,7 @@ def _episodes(entry: object) -> tuple[str | None, tuple[int, ...]]:
 
 
 def _channel(name: str) -> tuple[str, str]:
-    topic, dot, field = name.partition(".")
+    topic, dot, field = str(name).partition(".")
     if topic not in TOPICS or not dot or not NAME.fullmatch(field):
         raise RigtwinError(
             f'[channels] {name!r}: expected "/command.NAME" or "/sensor.NAME", the name of letters '
@@ -204,7 +204,7 @@ def _tables(document: Mapping[str, Any], name: str) -> Mapping[str, Any]:
     if not isinstance(table, Mapping):
         raise RigtwinError(f"[{name}]: expected a table")
     for key in table:
-        if not key.isidentifier():
+        if not str(key).isidentifier():
             raise RigtwinError(
                 f"[{name}] {key!r}: expected a name of letters, digits and _, as formulas take it"
             )

@@ -13,7 +13,7 @@ from rigtwin.importing.cells import Numbers, gather_rows, split_cells
 from rigtwin.importing.columns import Columns, is_missing, is_value
 from rigtwin.importing.fast_text import read_plain
 from rigtwin.importing.format import Format
-from rigtwin.importing.lines import find_encoding, read_lines
+from rigtwin.importing.lines import find_encoding, is_cut_off, read_lines
 from rigtwin.importing.naming import repeated_names, split_unit
 from rigtwin.importing.selection import EVERYTHING, Selection
 from rigtwin.importing.units import is_unit
@@ -24,6 +24,10 @@ SURE = 5
 """Number of consecutive lines of one shape that mark the beginning of the data."""
 HEADER = 400
 """Number of lines within which the data must begin."""
+MOST_COLUMNS = 20_000
+"""Largest number of columns of a file."""
+NUMBERED = 3
+"""Number of columns from which a first line 0, 1, 2, … is a header that numbers them."""
 
 
 @dataclass(frozen=True)
@@ -118,6 +122,11 @@ def read_text(path: Path, selection: Selection = EVERYTHING) -> Columns:
     for name, place in needed.items():
         if columns[place].are_stamps:
             units.setdefault(name, "s")
+    if not any(note.startswith("the last line") for note in notes) and is_cut_off(path, encoding):
+        notes = (
+            *notes,
+            "the last line has no end; if the file was cut off there, its last number may be wrong",
+        )
     mark = {"\t": "tab", " ": "space"}.get(layout.separator, layout.separator)
     form = f"text, separated by {mark}, decimal {layout.decimal}, data from line {layout.first + 1}"
     if layout.words:
@@ -153,6 +162,11 @@ def _read_columns(
 
 def _look_at(line: str, separator: str, decimal: str) -> Line:
     cells = split_cells(line, separator)
+    if len(cells) > MOST_COLUMNS:
+        raise RigtwinError(
+            f"a line that begins {line[:30]!r} has {len(cells)} cells; "
+            f"expected at most {MOST_COLUMNS}"
+        )
     while cells and not cells[-1]:
         cells.pop()
     words = frozenset(n for n, cell in enumerate(cells) if not is_value(cell, decimal))
@@ -185,9 +199,21 @@ def find_layout(lines: Sequence[str]) -> Layout | None:
             ):
                 quality = (numbers // 2, -SEPARATORS.index(separator))
             if best is None or quality > best[0]:
-                plain = Layout(separator, decimal, first, (), (), seen[first].words)
+                begin = first + _is_numbering(lines[first : first + 2], separator)
+                plain = Layout(separator, decimal, begin, (), (), seen[first].words)
                 best = quality, _read_header(lines, plain, seen[first].cells)
     return None if best is None else best[1]
+
+
+def _is_numbering(lines: Sequence[str], separator: str) -> bool:
+    """Return whether the first of two lines numbers the columns from 0 or 1, as pandas does where
+    they have no names. The next line then holds something else than whole numbers."""
+    if len(lines) < 2:
+        return False
+    numbers = [cell for cell in split_cells(lines[0], separator) if cell]
+    below = [cell for cell in split_cells(lines[1], separator) if cell]
+    counts = [[str(n + start) for n in range(len(numbers))] for start in (0, 1)]
+    return len(numbers) >= NUMBERED and numbers in counts and not all(map(str.isdigit, below))
 
 
 def _begins(seen: Sequence[Line], at: int) -> bool:

@@ -16,6 +16,8 @@ PLAUSIBLE = (1e-5, 0.1)
 """s; periods that a time column without a unit may have in seconds."""
 POSSIBLE = (1e-6, 10.0)
 """s; periods that a recording may have."""
+MOST_VALUES = 300_000_000
+"""Largest number of values, ticks times signals, that resampling makes: 2.4 GB."""
 COLUMN_UNITS = ("d", "h", "min", "ms", "us", "ns")
 """Units that a time column may be in, apart from seconds."""
 Signals = Mapping[str, Array]
@@ -130,8 +132,16 @@ def resample(
 ) -> tuple[Array, Signals]:
     """Return time and signals at another period, interpolated linearly; report bridged gaps.
 
-    A low pass runs first where the new period is longer, so that nothing is aliased.
+    A low pass runs first where the new period is longer, so that nothing is aliased. Raises
+    RigtwinError if that makes more values than fit into memory.
     """
+    ticks = (time[-1] - time[0]) / wanted
+    if ticks * (len(signals) + 1) > MOST_VALUES:
+        raise RigtwinError(
+            f"[time] resample = {wanted:g} s makes {ticks:.3g} ticks of {len(signals)} signals in "
+            f"{time[-1] - time[0]:.4g} s; expected at most {MOST_VALUES:g} values; take a stretch "
+            "by [time] start and until"
+        )
     bridged = np.diff(time)
     bridged = bridged[bridged > (1.0 + JITTER) * period]
     if len(bridged):

@@ -88,6 +88,8 @@ UNITS: dict[str, tuple[str, float]] = {
     "%": ("1", 1e-2),
 }
 """Unit → SI unit, and the factor that converts to it."""
+QUANTITIES = frozenset(unit for unit, _ in UNITS.values()) - {"1"}
+"""SI units of the quantities that channels have."""
 _SPELLINGS = {
     "µm": "um",
     "μm": "um",

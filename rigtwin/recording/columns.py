@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +19,7 @@ from rigtwin.recording.schema import decode_rows
 
 
 def decode_columns(
-    path: Path, channel: Channel, schema: Schema | None, data: list[bytes]
+    path: Path, channel: Channel, schema: Schema | None, data: list[bytes], notes: list[str]
 ) -> dict[str, Array]:
     """Decode the columns of a topic; columns of the channel table come first.
 
@@ -31,6 +31,8 @@ def decode_columns(
         Channel and schema of the topic. A protobuf topic needs its schema.
     data
         Messages in order.
+    notes
+        Notes on the file, to which channels are added that are left out.
 
     Returns
     -------
@@ -67,6 +69,7 @@ def decode_columns(
         )
     order = [name for name in names if any(name in row for row in rows)]
     order += [name for name in _numbers(rows) if name not in order]
+    notes += _notes_on_left_out(channel.topic, rows, order)
     if not order:
         raise RigtwinError(f"{path}: {channel.topic} has none of the fields {', '.join(names)}")
     return {
@@ -120,6 +123,22 @@ def _numbers(rows: list[Mapping[str, Any]]) -> list[str]:
         if rows
         else []
     )
+
+
+def _notes_on_left_out(
+    topic: str, rows: list[Mapping[str, Any]], order: list[str]
+) -> Iterator[str]:
+    """Note the fields that are numbers in some messages only. Fields that are never numbers, such
+    as texts, need no note."""
+    for name in dict.fromkeys(name for row in rows for name in row):
+        if name in order or not name.isprintable():
+            continue
+        missing = [type(row.get(name)) not in (int, float) for row in rows]
+        if not all(missing):
+            yield (
+                f"{topic}.{name} is no number in {sum(missing)} messages, the first is message "
+                f"{missing.index(True)}; the channel is left out"
+            )
 
 
 def _column(path: Path, channel: str, values: list[Any]) -> Array:

@@ -95,6 +95,8 @@ class Recording:
 
         Raises RigtwinError if the recording lacks it.
         """
+        if not isinstance(channel, str):
+            raise RigtwinError(f"{channel!r:.60}: expected a channel such as '/sensor.load_cell'")
         topic, _, name = channel.partition(".")
         return self.column(topic, name)
 
@@ -322,7 +324,9 @@ class FileContent:
                     f"{path}: a message on {channel.topic} has time {max(times)} ns; "
                     "expected ns since the start"
                 )
-            values = decode_columns(path, channel, self._schemas.get(channel.schema_id), data)
+            values = decode_columns(
+                path, channel, self._schemas.get(channel.schema_id), data, notes
+            )
             # Times stay in whole nanoseconds until topics are aligned: doubles would not compare
             # equal.
             stamps = np.array(times, np.int64)

@@ -153,9 +153,13 @@ def find_stretch(recording: Recording, start: float, until: float | None) -> sli
     RigtwinError
         If the stretch is empty or a time is not finite.
     """
+    if recording.ticks < 2:
+        raise RigtwinError(
+            f"{recording.path}: it has {recording.ticks} ticks; expected two or more"
+        )
     end = float(recording.time[-1]) if until is None else until
     if not (math.isfinite(start) and math.isfinite(end)):
-        raise RigtwinError(f"--from {start:g} --until {end:g}: expected times in s")
+        raise RigtwinError(f"start {start:g} s, until {end:g} s: expected finite times")
     # Half a period of tolerance includes a last tick that rounding has moved.
     first, last = np.searchsorted(recording.time, [start, end + recording.period / 2])
     if last - first < 2:

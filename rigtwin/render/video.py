@@ -85,7 +85,7 @@ def film(
     if out.suffix.lower() != ".mp4":
         raise RigtwinError(f"cannot film {out.name!r}: the name must end in .mp4")
     if not 0.0 < magnify <= 20.0:
-        raise RigtwinError(f"--magnify {magnify:g}: expected more than 0, at most 20")
+        raise RigtwinError(f"magnify {magnify:g}: expected more than 0, at most 20")
     ticks = find_stretch(recording, start, until)
     motions = {
         name: magnify * values[ticks] for name, values in _motions(recording, machine).items()

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Machine
-from rigtwin.diagnosis.data_checks import require_fit
+from rigtwin.diagnosis.data_checks import channels, require_fit
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.errors import RigtwinError
 from rigtwin.recording import Recording
@@ -114,6 +114,7 @@ class Watch:
             If the recording is of another machine or lacks a channel.
         """
         if not self._cusums:
+            self._require_channels(recording)
             self._start = self.judged = float(recording.time[0])
             names = [row.name for row in self.machine.rows]
             self._cusums = [[Cusum(self._start) for _ in BANDS] for _ in names]
@@ -146,6 +147,16 @@ class Watch:
         self.judged = until
         self.highest = max(self.highest, self.level)
         return True
+
+    def _require_channels(self, recording: Recording) -> None:
+        """Raise RigtwinError if the recording is of another machine or lacks a channel."""
+        if recording.machine != self.machine.name:
+            raise RigtwinError(
+                f"{recording.path}: it is of machine {recording.machine!r}; this twin is "
+                f"{self.machine.name!r}"
+            )
+        for topic, name in channels(self.machine):
+            recording.column(topic, name)
 
     def _evidence(self, window: Recording, counts: NDArray[np.bool_]) -> Evidence:
         """Return the evidence of a window; only the given ticks count, once the twin is settled."""

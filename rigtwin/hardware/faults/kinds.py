@@ -48,8 +48,10 @@ KINDS = (
     FaultKind(
         "dropout", "sensor", "reads 0 V from then on", ("stuck", *_IMPLAUSIBLE), everywhere=False
     ),
-    FaultKind("stuck", "sensor", "repeats its last reading", ("stuck",), everywhere=False),
-    FaultKind("spike", "sensor", "one reading off by 10 to 90 % of its range", ("jump",)),
+    # A load cell may be off the force of the motor's voltage by its limit before its readings have
+    # repeated often enough, or while they change by less than a jump.
+    FaultKind("stuck", "sensor", "repeats its last reading", ("stuck", "motor"), everywhere=False),
+    FaultKind("spike", "sensor", "one reading off by 10 to 90 % of its range", ("jump", "motor")),
     FaultKind("not a number", "sensor", "the driver gives NaN", ("not_a_number",)),
     FaultKind(
         "wrong sign",
@@ -59,8 +61,8 @@ KINDS = (
         everywhere=False,
     ),
     FaultKind("gain x10", "sensor", "reads ten times as much", _IMPLAUSIBLE, everywhere=False),
-    FaultKind("step", "sensor", "reads 20 % of its range too much", ("jump",)),
-    FaultKind("open input", "sensor", "reads anything within its range", ("jump",)),
+    FaultKind("step", "sensor", "reads 20 % of its range too much", ("jump", "motor")),
+    FaultKind("open input", "sensor", "reads anything within its range", ("jump", "motor")),
     FaultKind(
         "amplifier dead",
         "actuator",

@@ -109,7 +109,7 @@ def judge(fault: InjectedFault, test: Test, bench: FaultyBench, path: Path) -> F
     # A sensor's fault must be blamed on the right sensor, not only on the right cause.
     named = (
         fault.kind.place != "sensor"
-        or cause not in ("jump", "stuck", "not_a_number")
+        or cause not in ("jump", "stuck", "not_a_number", "motor")
         or SIGNALS[fault.place] in reason
     )
     right = named and (cause in fault.kind.causes or (harmless and shown < 0))
