@@ -283,6 +283,7 @@ mass = 2.5
 "/sensor.velocity" = { formula = "derivative(travel)" }
 "/command.force" = { formula = "load - mass * derivative(derivative(travel))" }
 "/command.mean" = { formula = "mean(load, 5) + 0 * f" }
+"/command.ramp" = { formula = "integral(3) + 0 * f" }
 """
 
 
@@ -298,6 +299,8 @@ def test_channels_are_worked_out_without_lateness(tmp_path: Path):
     inertia = -2.5 * 1.28 * np.sin(8.0 * TIME)
     np.testing.assert_allclose(force, (FORCE - inertia)[inside], atol=1e-3)
     np.testing.assert_allclose(mean, FORCE[inside], atol=0.05)
+    ramp = recording.column("/command", "ramp")
+    np.testing.assert_allclose(ramp, 3.0 * TIME, atol=1e-9)
 
 
 def test_files_side_by_side(tmp_path: Path):

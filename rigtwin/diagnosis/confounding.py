@@ -26,12 +26,13 @@ SCALING = ("mass", "gain", "position_gain")
 """Kinds that scale all forces or motions of a joint, so that others may undo them."""
 STEP = 0.02
 """Relative change of each value."""
-UNDONE = 0.1
+UNDONE = 0.15
 """Share of the response to a declared value that fitted values leave where they undo it."""
 CHANGE, VISIBLE = 0.1, 60.0
 """A declared value counts if a relative change of `CHANGE` changes the data by this chi-square."""
-INVOLVED = 0.1
-"""Smallest exponent of a fitted value that is reported."""
+INVOLVED, STEEPEST = 0.1, 3.0
+"""Smallest exponent of a fitted value that is reported, and largest one of a physical law. Larger
+ones undo a change by the difference of two responses that resemble each other."""
 
 
 def find_confounded(
@@ -79,7 +80,7 @@ def find_confounded(
         if float(target @ target) * CHANGE**2 < VISIBLE:
             continue
         exponents = -np.linalg.lstsq(columns, target, rcond=None)[0]
-        if not _undoes(columns, exponents, target):
+        if not _undoes(columns, exponents, target) or np.abs(exponents).max() > STEEPEST:
             continue
         # Columns that resemble each other share an exponent; the simple law is told if it holds.
         simple = np.clip(np.round(exponents), -1.0, 1.0)

@@ -149,19 +149,18 @@ def evaluate(formula: Formula, columns: Mapping[str, Array], period: float) -> A
             registers.append(PLAIN[code](*operands[: OPERANDS.get(code, 2)]))
         else:
             length = float(np.asarray(operands[1]).flat[0])
-            registers.append(_remember(code, np.asarray(operands[0], float), length, period))
-    # A result may be a single number, such as the derivative of a constant.
+            signal = np.broadcast_to(np.asarray(operands[0], float), (rows,))
+            registers.append(_remember(code, signal, length, period))
+    # A result may be a single number, such as a constant.
     return np.broadcast_to(np.asarray(registers[-1], float), (rows,)).copy()
 
 
-def _remember(code: int, signal: Array, length: float, period: float) -> Array | float:
+def _remember(code: int, signal: Array, length: float, period: float) -> Array:
     """Return the result of an operation with memory, such as a derivative or a low pass."""
     # Importing scipy.signal takes a second, which only these formulas pay for.
     from scipy.ndimage import uniform_filter1d
     from scipy.signal import butter, sosfiltfilt
 
-    if signal.ndim == 0:
-        return 0.0 if code == DERIVATIVE else float(signal)
     if code == DERIVATIVE:
         return np.gradient(signal, period)
     if code == INTEGRAL:

@@ -107,7 +107,7 @@ def step_behind_play(
     Parameters
     ----------
     guide_step
-        What resists the motion of the joint.
+        Guide that resists the motion of the joint.
     play
         Play between motor and joint.
     mass

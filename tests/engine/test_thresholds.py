@@ -20,6 +20,7 @@ SCORE = {
     "material_model_errors": 2.0,
     "steady_standard_errors": 4.0,
     "unsteady_price": 20.0,
+    "mass_log_error": 0.25,
     "prohibitive_price": 50.0,
     "within_noise_weight": 0.3,
     "chance_deviations": 2.0,

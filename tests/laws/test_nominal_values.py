@@ -96,6 +96,7 @@ NOMINAL: dict[type, dict[str, float]] = {
         "force_limit": NO_LIMIT,
         "gain": 1.0,
         "rate_limit": NO_LIMIT,
+        "rotor_share": 0.5,
         **RANGE,
     },
     Tyre: {"stiffness": 50_000.0, "hardening_power": 1.0},
