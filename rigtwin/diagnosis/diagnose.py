@@ -28,6 +28,7 @@ from rigtwin.diagnosis.finding import (
     Answer,
     Finding,
     Gap,
+    Interval,
     NextTest,
     Place,
     Verdict,
@@ -300,7 +301,7 @@ def _diagnose_part(
     verdict = _choose_verdict(judged, readings, effects, thresholds)
     where = _places(evidence, attributed, judged, disturbances, readings)
     progress("replaying components", 1)
-    gap = _measure_gap(evidence, plant, judged.validation, readings.sampled)
+    gap = _measure_gap(evidence, judged, readings.sampled)
     progress("choosing the next test", 1)
     next_test = _next_test(evidence.machine, explanation, effects, named, tests, thresholds)
     has_gap = verdict != "no gap"
@@ -419,13 +420,7 @@ def _choose_verdict(
     has_residual = judged.has_residual or readings.has_unknown_controller
     if not effects:
         return "unknown" if has_residual else "no gap"
-    posterior, validation = judged.explanation.posterior, judged.validation
-    # A gap in few frequencies does not raise the rms over all of them above the floor; the closed
-    # share then comes from the spectral lines.
-    closed = (
-        validation.held_out.value if validation.measurable else posterior.closes(posterior.best)
-    )
-    closes_enough = not judged.named or closed >= thresholds.explained_share
+    closes_enough = not judged.named or _closed_share(judged) >= thresholds.explained_share
     return "explained" if closes_enough and not has_residual else "partly explained"
 
 
@@ -527,21 +522,35 @@ def _energy(evidence: Evidence) -> dict[str, EnergyError]:
     return {name: error for name, error in errors.items() if error is not None}
 
 
-def _measure_gap(
-    evidence: Evidence, plant: Plant, validation: Validation, sampled: Sequence[SensorProperty]
-) -> Gap:
+def _measure_gap(evidence: Evidence, judged: _Judged, sampled: Sequence[SensorProperty]) -> Gap:
+    plant, validation = judged.plant, judged.validation
     corrected = _correct(evidence.configurations[0], plant, sampled)
     replays, loop = evidence.machine.physics.levels(evidence, plant, corrected)
+    closed = validation.held_out
+    if not validation.measurable:
+        closed = Interval(*(_closed_share(judged),) * 3)
     return Gap(
         before=gap_level(evidence, evidence.plant),
         after=gap_level(evidence, plant),
         floor=1.0,
         shrinkage_predicted=validation.predicted,
-        shrinkage_held_out=validation.held_out,
+        shrinkage_held_out=closed,
         held_out=validation.data,
         replays=replays,
         closed_loop=loop,
     )
+
+
+def _closed_share(judged: _Judged) -> float:
+    """Return the share of the gap that the correction closes on held-out data.
+
+    A gap in few frequencies does not raise the rms over all of them above the floor; the closed
+    share then comes from the spectral lines.
+    """
+    posterior, validation = judged.explanation.posterior, judged.validation
+    if validation.measurable:
+        return validation.held_out.value
+    return posterior.closes(posterior.best) if judged.named else 0.0
 
 
 def _correct(
