@@ -5,7 +5,8 @@ With the channel's value u behind a first-order lag, position x and velocity v o
     F = coulomb·u·s + viscous·u·v + offset·u,
 
 where s, from −1 to 1, is dry friction of unit size: the direction of motion, after a reversal only
-once the joint has moved by the error of its measured position. The dampers of controllable fluids
+once the joint has moved by the error of its measured position. Where the friction builds up over a
+speed v_r, `rounding`, s = tanh(v/v_r). The dampers of controllable fluids
 are of this kind [Spencer, Dyke, Sain and Carlson, J. Eng. Mech. 123(3), 1997].
 """
 
@@ -36,6 +37,7 @@ class Schedule(NamedTuple):
     viscous: Annotated[float, Quantity("Ns/m per unit of the channel", -1e9, 1e9, NONE)] = 0.0
     offset: Annotated[float, Quantity("N per unit of the channel", -1e9, 1e9, NONE)] = 0.0
     lag: Annotated[float, Quantity("s", 0.0, 10.0, NONE)] = 0.0
+    rounding: Annotated[float, Quantity("m/s", 0.0, 1e3, NONE)] = 0.0
 
 
 def follow(schedule: Schedule, level: Array, period: float) -> Array:
@@ -70,7 +72,10 @@ def scheduled_force(schedule: Schedule, level: Array, motion: Array, spring: flo
     force = schedule.viscous * level * motion[1] + schedule.offset * level
     if schedule.coulomb != 0.0:
         direction = np.zeros(motion.shape[1])
-        find_direction(motion[0], spring, direction)
+        if schedule.rounding > 0.0:
+            direction = np.tanh(motion[1] / schedule.rounding)
+        else:
+            find_direction(motion[0], spring, direction)
         force = force + schedule.coulomb * level * direction
     return np.asarray(force)
 
@@ -112,6 +117,11 @@ def _lag(context: Context) -> Starts:
     return Starts.single(times, 0.5 * period)
 
 
+def _rounding(context: Context) -> Starts:
+    speed = context.scales.speed
+    return Starts.single([share * speed for share in (0.05, 0.3, 1.0)], 0.01 * speed)
+
+
 KINDS = (
     Kind(
         "coulomb",
@@ -140,5 +150,12 @@ KINDS = (
         ("lag",),
         "the force follows the recorded channel late",
         {Schedule: _lag},
+    ),
+    Kind(
+        "rounding",
+        "rounding of proportional friction",
+        ("rounding",),
+        "dry friction that grows with the channel builds up over this speed",
+        {Schedule: _rounding},
     ),
 )

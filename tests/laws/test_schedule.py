@@ -35,3 +35,10 @@ def test_the_channel_acts_behind_a_first_order_lag():
     late = follow(Schedule(lag=0.05), step, PERIOD)
     expected = 2.0 * (1.0 - np.exp(-np.maximum(TIME - 1.0, 0.0) / 0.05))
     np.testing.assert_allclose(late, expected, atol=0.05)
+
+
+@law_of("rounding", Schedule)
+def test_rounded_friction_is_a_hyperbolic_tangent_of_the_speed():
+    """F = 20 u tanh(v / 0.03)."""
+    force = scheduled_force(Schedule(coulomb=20.0, rounding=0.03), VOLTAGE, MOTION, 1e9)
+    np.testing.assert_allclose(force, 20.0 * VOLTAGE * np.tanh(SPEED / 0.03), atol=1e-9)
