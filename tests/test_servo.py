@@ -226,6 +226,15 @@ def test_the_users_mjcf_gets_the_gains_that_were_found(tmp_path: Path) -> None:
     assert after.actuator_history[0, 0] * after.opt.timestep >= 0.01
 
 
+def test_the_users_mjcf_gets_both_gains_by_their_factor(tmp_path: Path) -> None:
+    machine = machine_in(tmp_path, ONE, model_text(two=False))
+    changes = [Change("servo", "gains", 2.0), Change("servo", "damping_gain", 1.4)]
+    assert write_mjcf(tmp_path / "new.xml", machine, changes) == ()
+    model = mujoco.MjModel.from_xml_path(str(tmp_path / "new.xml"))
+    assert model.actuator_gainprm[0, 0] == 40.0
+    assert model.actuator_biasprm[0, 1:3].tolist() == [-40.0, -2.8]
+
+
 def test_the_users_mjcf_gets_the_timing_and_the_limit_of_a_servo(tmp_path: Path) -> None:
     machine = machine_in(tmp_path, ONE, model_text(two=False))
     values = {"delay": 0.0101, "lag": 0.03, "force_limit": 4.0, "deadband": 0.01}

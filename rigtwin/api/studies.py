@@ -17,7 +17,7 @@ from experiments.rths.tuning import TunedCompensator as TunedCompensator
 from experiments.rths.tuning import tune_compensator as tune_compensator
 from experiments.thesis.result import Reproduction
 from experiments.thesis.result import reproduce as reproduce_thesis
-from referee import arm, check, wild
+from referee import arm, check, servo, wild
 from rigtwin.api.machines import resolve_machine
 from rigtwin.description.machine import Machine
 from rigtwin.errors import RigtwinError
@@ -26,7 +26,7 @@ from rigtwin.studies.identifiability import find_identifiable
 from rigtwin.studies.sweep import open_workers
 
 MOST_PLANTS = 1000
-Draw = Literal["wild", "arm"]
+Draw = Literal["wild", "arm", "servo"]
 Progress = Callable[[int, int], object]
 """Function called with the number of finished steps and with their total."""
 
@@ -221,7 +221,7 @@ def blindcheck_machines(
     workers: int | None = None,
     cluster: str | None = None,
     progress: Progress = ignore_progress,
-) -> wild.WildResult | arm.ArmResult:
+) -> wild.WildResult | arm.ArmResult | servo.ServoResult:
     """Check the diagnosis on machines other than the rig, with withheld defects.
 
     Parameters
@@ -230,7 +230,8 @@ def blindcheck_machines(
         Number of machines, at least 1.
     draw
         Kind of the machines. "wild": their physics have forms that the library does not contain.
-        "arm": their joints act on each other.
+        "arm": their joints act on each other. "servo": links on servos, known by command and angle
+        alone.
     seed
         Seed of the draws.
     folder
@@ -243,7 +244,7 @@ def blindcheck_machines(
 
     Returns
     -------
-    WildResult or ArmResult
+    WildResult, ArmResult or ServoResult
         Answers beside the withheld defects.
 
     Raises
@@ -252,7 +253,7 @@ def blindcheck_machines(
         For an unknown draw, or if the folder cannot be written.
     """
     _check_draw(cases, seed)
-    checks = {"wild": wild.check_wild, "arm": arm.check_arms}
+    checks = {"wild": wild.check_wild, "arm": arm.check_arms, "servo": servo.check_servos}
     if draw not in checks:
         raise RigtwinError(f"draw {draw!r:.40}: expected one of {', '.join(checks)}")
     with open_workers(workers, cluster) as open_:

@@ -44,9 +44,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--machine",
-        choices=("rig", "arm"),
+        choices=("rig", "arm", "servo"),
         default="rig",
-        help="machines with withheld defects (default rig); arm: joints that act on each other",
+        help="machines with withheld defects (default rig); arm: joints that act on each other; "
+        "servo: links on servos known by command and angle alone",
     )
     parser.add_argument(
         "--seed", type=int, default=2026, help="seed of the referee's draws (default 2026)"
@@ -83,9 +84,11 @@ def execute(parsed: argparse.Namespace) -> int:
         raise RigtwinError("--draw: expected with --wild")
     if parsed.wild and (parsed.tune is not None or parsed.baselines):
         raise RigtwinError("--wild: expected without --tune and --baselines")
-    if parsed.machine == "arm" and (parsed.wild or parsed.tune is not None or parsed.baselines):
-        raise RigtwinError("--machine arm: expected without --wild, --tune and --baselines")
-    if parsed.wild or parsed.machine == "arm":
+    if parsed.machine != "rig" and (parsed.wild or parsed.tune is not None or parsed.baselines):
+        raise RigtwinError(
+            f"--machine {parsed.machine}: expected without --wild, --tune and --baselines"
+        )
+    if parsed.wild or parsed.machine != "rig":
         return _machines(parsed)
     return _diagnoses(parsed) if parsed.tune is None else _tuning(parsed)
 
@@ -112,10 +115,15 @@ def _diagnoses(parsed: argparse.Namespace) -> int:
 
 def _machines(parsed: argparse.Namespace) -> int:
     from referee.arm import arm_document, arm_table
+    from referee.servo import servo_document, servo_table
     from referee.wild import judge_names, reliability, wild_document, wild_table
 
-    draw = "wild" if parsed.wild else "arm"
-    table, document = (wild_table, wild_document) if parsed.wild else (arm_table, arm_document)
+    draw = "wild" if parsed.wild else parsed.machine
+    table, document = {
+        "wild": (wild_table, wild_document),
+        "arm": (arm_table, arm_document),
+        "servo": (servo_table, servo_document),
+    }[draw]
     with counting_bar("machine", "machines") as progress:
         result: Any = rigtwin.blindcheck_machines(
             CASES if parsed.cases is None else parsed.cases,

@@ -1,10 +1,10 @@
 """Servo: an actuator with a position controller of its own.
 
-    force = clip(position_gain·(command − position) − damping_gain·speed, ±force_limit)
+    force = clip(gains·(position_gain·(command − position) − damping_gain·speed), ±force_limit)
 
 This is MuJoCo's `position` actuator with `kp`, `kv` and `forcerange` (MuJoCo, XML reference,
-actuator/position). Units are those of a sliding joint; for a turning joint, read rad for m and Nm
-for N.
+actuator/position). `gains` scales both gains, as a wrong torque constant of the motor does. Units
+are those of a sliding joint; for a turning joint, read rad for m and Nm for N.
 """
 
 from __future__ import annotations
@@ -36,6 +36,7 @@ class Servo(NamedTuple):
     force_limit: Annotated[float, Quantity("N", 1e-9, UNLIMITED, MJCF)] = UNLIMITED
     command_low: Annotated[float, Quantity("m", -UNLIMITED, UNLIMITED, MJCF)] = -UNLIMITED
     command_high: Annotated[float, Quantity("m", -UNLIMITED, UNLIMITED, MJCF)] = UNLIMITED
+    gains: Annotated[float, Quantity("1", 0.05, 20.0, "1: as specified")] = 1.0
     # Conditioning of the command; neutral in the nominal machine.
     gain: Annotated[float, Quantity("1", 0.05, 5.0, "1: as specified")] = 1.0
     lag: Annotated[float, Quantity("s", 0.0, 10.0, NONE)] = 0.0
@@ -87,10 +88,9 @@ def push_law(actuator: Pusher) -> Push:
     """Return the law of a force actuator or a servo."""
     limit = min(actuator.force_limit, UNLIMITED)
     if isinstance(actuator, Servo):
-        band = actuator.position_gain * actuator.deadband
-        return Push(
-            actuator.position_gain, actuator.position_gain, actuator.damping_gain, band, limit
-        )
+        stiffness = actuator.gains * actuator.position_gain
+        damping = actuator.gains * actuator.damping_gain
+        return Push(stiffness, stiffness, damping, stiffness * actuator.deadband, limit)
     return Push(actuator.constant, 0.0, 0.0, 0.0, limit)
 
 
@@ -162,6 +162,13 @@ KINDS = (
         ("backlash", "rotor_share", "rotor_friction"),
         "a play between the servo's motor, whose position it controls, and the joint",
         {Servo: _backlash},
+    ),
+    Kind(
+        "gains",
+        "factor on both gains",
+        ("gains",),
+        "position and damping gain multiplied by this factor, as by a wrong torque constant",
+        {Servo: shares_of_nominal((0.3, 0.6, 1.6, 3.5), 0.004)},
     ),
     Kind(
         "position_gain",

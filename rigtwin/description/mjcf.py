@@ -234,7 +234,7 @@ def _apply(document: Document, machine: Machine, change: Change, changes: Sequen
         ):
             # Only <position> has kp and kv, and MuJoCo computes kv from dampratio where it is set.
             return False
-        document.set(tag, attribute, _number(change.value))
+        document.set(tag, attribute, _number(change.value * _factor_of(component, changes)))
         return True
     if component.component_type is Mass and change.parameter == "mass":
         nominal = component_of(machine.plant, component.name, Mass).mass
@@ -243,6 +243,16 @@ def _apply(document: Document, machine: Machine, change: Change, changes: Sequen
     if component.element == "actuator":
         return _apply_to_actuator(document, machine, component, change, changes)
     return False
+
+
+def _factor_of(component: Component, changes: Sequence[Change]) -> float:
+    """Return the factor on both gains of a servo that one of the changes sets, or else 1."""
+    factors = (
+        change.value
+        for change in changes
+        if (change.component, change.parameter) == (component.name, "gains")
+    )
+    return next(factors, 1.0) if component.component_type is Servo else 1.0
 
 
 def _apply_to_actuator(
@@ -259,6 +269,16 @@ def _apply_to_actuator(
     of = component.component_type
     if change.parameter == "delay":
         _set_delay(document, tag, model, number, change.value)
+    elif change.parameter == "gains" and tag.name == "position":
+        if "dampratio" in tag.attributes:
+            return False
+        servo = component_of(machine.plant, component.name, Servo)
+        own = {other.parameter for other in changes if other.component == component.name}
+        for parameter, attribute in ATTRIBUTES[Servo].items():
+            # A gain that is changed by itself is scaled where it is written.
+            if parameter not in own:
+                value = change.value / servo.gains * float(getattr(servo, parameter))
+                document.set(tag, attribute, _number(value))
     elif change.parameter == "lag" and of is Servo and tag.name == "position":
         document.set(tag, "timeconst", _number(change.value))
     elif change.parameter == "lag" and of in PUSHERS and tag.name == "general":

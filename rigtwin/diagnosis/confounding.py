@@ -22,7 +22,7 @@ from rigtwin.diagnosis.fit import Fit, clashes, with_values
 from rigtwin.diagnosis.space import Space
 from rigtwin.numerics.arrays import Array
 
-SCALING = ("mass", "gain", "position_gain")
+SCALING = ("mass", "gain", "gains", "position_gain")
 """Kinds that scale all forces or motions of a joint, so that others may undo them."""
 STEP = 0.02
 """Relative change of each value."""
@@ -57,10 +57,13 @@ def find_confounded(
         One entry for each declared value whose change the fitted values would undo.
     """
     searched = evidence.thin()
+    # Two scales of one component are one thing: the fitted one says it.
+    scaled = {effect.group for effect in fit.effects if effect.kind.name in SCALING}
     scaling = [
         effect
         for effect in candidates
         if effect.kind.name in SCALING
+        and effect.group not in scaled
         and not clashes(effect, fit.effects)
         and _declared(effect, searched) > 0.0
     ]

@@ -95,6 +95,7 @@ NOMINAL: dict[type, dict[str, float]] = {
         "position_gain": 1.0,
         "force_limit": NO_LIMIT,
         "gain": 1.0,
+        "gains": 1.0,
         "rate_limit": NO_LIMIT,
         "rotor_share": 0.5,
         **RANGE,

@@ -18,6 +18,7 @@ STATES = [(0.3, 0.1, 0.0), (0.1, 0.3, 0.2), (-0.2, 0.4, -0.5), (0.105, 0.1, 0.03
 
 @law_of("position_gain", Servo)
 @law_of("damping_gain", Servo)
+@law_of("gains", Servo)
 @law_of("force_limit", Servo)
 @law_of("deadband", Servo)
 @pytest.mark.parametrize(
@@ -29,19 +30,21 @@ STATES = [(0.3, 0.1, 0.0), (0.1, 0.3, 0.2), (-0.2, 0.4, -0.5), (0.105, 0.1, 0.03
         Servo(position_gain=80.0, damping_gain=3.0),
         Servo(position_gain=80.0, damping_gain=3.0, force_limit=12.0),
         Servo(position_gain=80.0, deadband=0.02, damping_gain=3.0),
+        Servo(position_gain=80.0, deadband=0.02, damping_gain=3.0, gains=1.7),
     ],
 )
 @pytest.mark.parametrize("state", STATES)
 def test_a_servo_pushes_by_its_error_less_its_damping_within_its_limit(servo, state):
-    """F = k (e − band sgn e) − d v within ± limit, and no k e within the band."""
+    """F = g (k (e − band sgn e) − d v) within ± limit, and no k e within the band."""
     command, position, speed = state
     error = command - position
     beyond = math.copysign(max(abs(error) - servo.deadband, 0.0), error)
-    force = servo.position_gain * beyond - servo.damping_gain * speed
+    force = servo.gains * (servo.position_gain * beyond - servo.damping_gain * speed)
     expected = min(max(force, -servo.force_limit), servo.force_limit)
     law = push_law(servo)
     assert push(law, command, position, speed) == pytest.approx(expected)
-    assert pull(law, command, position) == pytest.approx(servo.position_gain * beyond)
+    pulled = servo.gains * servo.position_gain * beyond
+    assert pull(law, command, position) == pytest.approx(pulled)
 
 
 @pytest.mark.parametrize("state", STATES)
