@@ -31,7 +31,7 @@ NOMINAL = ServoTruth(
 """Parameters of the description, typed in by hand."""
 ACCEPTED: Mapping[str, tuple[frozenset[str], ...]] = {
     # Each set holds names of one thing; one of each set must be named.
-    "delay": (frozenset({"delay@servo", "lag@servo", "delay@encoder", "lag@encoder"}),),
+    "delay": (frozenset({"delay@servo", "lag@servo"}),),
     "coulomb": (frozenset({"coulomb@joint"}),),
     "viscous": (frozenset({"viscous@joint", "damping_gain@servo"}),),
     "gains": (frozenset({"gains@servo", "position_gain@servo"}),),
