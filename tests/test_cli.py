@@ -265,3 +265,10 @@ def test_info_has_the_units_of_hinges(tmp_path, capsys):
     lines = capsys.readouterr().out.splitlines()
     assert [line.split()[1] for line in lines if "angle_" in line] == ["rad", "rad"]
     assert [line.split()[1] for line in lines if "torque_" in line] == ["Nm", "Nm"]
+
+
+def test_the_package_runs_as_a_module():
+    answer = subprocess.run(
+        [sys.executable, "-m", "rigtwin", "--version"], capture_output=True, text=True, check=True
+    )
+    assert answer.stdout.startswith("rigtwin ")
