@@ -119,7 +119,7 @@ def _numbers(name: str, column: Any, wrong: dict[str, str]) -> tuple[dict[str, A
 
 
 def _without_mask(column: Any) -> Array:
-    """Return a masked array as a plain one that is not a number where the mask hides a value."""
+    """Return a masked array as a plain one, with NaN where the mask hides a value."""
     if column.dtype.kind in "fiub":
         return column.astype(float).filled(np.nan)
     if column.dtype.kind in "Mm":
@@ -147,7 +147,7 @@ def _unpack(array: Array) -> Array:
 
 
 def _seconds(array: Any) -> Array:
-    """Return dates since 1970 or durations in s, not a number where there is none."""
+    """Return dates since 1970 or durations in s, with NaN for missing ones."""
     unit, count = np.datetime_data(array.dtype)
     # Years and months have no fixed length, so they become days first.
     if unit in ("Y", "M"):
