@@ -23,9 +23,11 @@ from rigtwin.models.forward_arrays import GuideContacts, State, WorkSpace
 from rigtwin.numerics.cholesky import solve
 from rigtwin.numerics.compiling import kernel
 
-SWEEPS, CONVERGED = 200, 1e-10
-"""Maximum number of Gauss-Seidel sweeps, and the change of a friction force, as a share of the
-largest friction limit, below which they end."""
+SWEEPS = 200
+"""Maximum number of Gauss-Seidel sweeps."""
+CONVERGED = 1e-10
+"""Largest change of a friction force at which the sweeps end, as a share of the largest friction
+limit."""
 BACKLASH = Guide._fields.index("backlash")
 
 
@@ -78,7 +80,7 @@ def bear(
 
 @inlined
 def find_responses(contacts: GuideContacts, free: np.ndarray, h: float, work: WorkSpace) -> float:
-    """Find the velocities without dry friction, and their response to 1 N of friction at each guide.
+    """Find velocities without dry friction, and their response to 1 N of friction at each guide.
 
     Returns the largest limit of any dry friction, N.
     """

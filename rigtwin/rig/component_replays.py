@@ -232,7 +232,7 @@ class ComponentReplays:
         return self._residual(self.wheel, self._apply_lvdts(self.carriage_output), "m")[0]
 
     def mechanics(self) -> Residual:
-        """Return the residual of force and wheel position, with motor and carriage as one replay."""
+        """Return the residual of force and wheel position of motor and carriage together."""
         force = self._apply_sensor("load_cell", self.mechanics_output.load_cell)
         pairs = {
             "load_cell": self._residual(self._sensor("load_cell"), force, "N"),
