@@ -93,7 +93,7 @@ def _expand(
         expansion.values[name], unit = convert(column)
         expansion.units |= {name: unit} if unit else {}
     else:
-        expansion.refused[name] = f"it holds {kind}, which is no number"
+        expansion.refused[name] = f"it holds {kind}, which is not numeric"
 
 
 def _field_of(column: Any, place: int) -> Any:

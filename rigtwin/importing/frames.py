@@ -106,7 +106,7 @@ def _numbers(name: str, column: Any, wrong: dict[str, str]) -> tuple[dict[str, A
             wrong[name] = f"{cells[row][:40]!r} in row {row + 1}"
         return {name: numbers}, ""
     if array.dtype.kind not in "fiub":
-        raise TypeError(f"it holds {array.dtype}, which is no number")
+        raise TypeError(f"it holds {array.dtype}, which is not numeric")
     array = array.astype(float)
     array[np.isinf(array)] = np.nan
     if array.ndim == 0:
@@ -125,7 +125,7 @@ def _without_mask(column: Any) -> Array:
     if column.dtype.kind in "Mm":
         return column.filled(column.dtype.type("NaT"))
     if np.ma.getmaskarray(column).any():
-        raise ValueError(f"it holds masked values of {column.dtype}, which is no number")
+        raise ValueError(f"it holds masked values of {column.dtype}, which is not numeric")
     return column.data
 
 
