@@ -75,8 +75,8 @@ def element(settings: Settings) -> tuple[Array, Array]:
     # Equal second moments: J = 2 I. G = E / (2 (1 + ν)) = E / 2.6.
     polar, shear = 2.0 * inertia, modulus / 2.6
     mass, stiffness = np.zeros((12, 12)), np.zeros((12, 12))
-    # Consistent matrices of a rod with linear shape functions: m·L/6·[2 1; 1 2] and EA/L·[1 −1; −1
-    # 1].
+    # Consistent matrices of a rod with linear shape functions:
+    # m·L/6·[2 1; 1 2] and EA/L·[1 −1; −1 1].
     rod = np.array([[2.0, 1.0], [1.0, 2.0]]) * length / 6.0
     spring = np.array([[1.0, -1.0], [-1.0, 1.0]]) / length
     # Axial displacement and torsion share the linear shape functions of a rod.
@@ -86,7 +86,7 @@ def element(settings: Settings) -> tuple[Array, Array]:
     ):
         block = np.ix_([first, first + 6], [first, first + 6])
         mass[block], stiffness[block] = inertial * rod, elastic * spring
-    # Bending in the plane x-z rotates about −y, in x-y about z: rotations change their sign.
+    # Bending in the x-z plane rotates about −y, so its rotations change sign; in x-y, about z.
     for freedoms, sign in (([2, 4, 8, 10], -1.0), ([1, 5, 7, 11], 1.0)):
         signs = np.array([1.0, sign, 1.0, sign])
         scale = np.outer(signs, signs)
@@ -137,7 +137,7 @@ def assembled(settings: Settings) -> tuple[Array, Array]:
                 [0.0, 0.0, 1.0],
             ]
         )
-        # Displacements and rotations of both nodes turn alike: four blocks of 3 × 3.
+        # One matrix transforms displacements and rotations of both nodes: four blocks of 3 × 3.
         whole = np.kron(np.eye(4), rotation)
         nodes = [0, *range(1 + BEAMS * arm, 1 + BEAMS * (arm + 1))]
         for inner, outer in pairwise(nodes):
@@ -172,7 +172,7 @@ def modes(settings: Settings, period: float) -> Modes:
 
 @lru_cache(maxsize=64)
 def _modes(settings: Settings, period: float) -> Modes:
-    """Return the sampled modes of some beams; the cached part of `modes`."""
+    """Return the sampled modes. The cached part of `modes`."""
     angular, shapes = _symmetric(settings)
     mass, _ = assembled(settings)
     upward = np.zeros(FREEDOMS)
@@ -215,7 +215,7 @@ def _symmetric(settings: Settings) -> tuple[Array, Array]:
             base[node + 3, 2 + 2 * number] = -math.sin(angle)
             base[node + 4, 2 + 2 * number] = math.cos(angle)
     squares, shapes = eigh(base.T @ stiffness @ base, base.T @ mass @ base)
-    # The heave mode is rigid; its eigenvalue is rounding.
+    # The heave mode is rigid: its eigenvalue differs from zero by rounding alone.
     squares[0] = 0.0
     return np.sqrt(squares[:MODES]), base @ shapes[:, :MODES]
 

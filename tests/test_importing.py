@@ -322,7 +322,7 @@ p = { column = "pos.J1", unit = "mm" }
     convert(files, tmp_path / "map.toml", tmp_path / "out.mcap")
     assert_right(load(tmp_path / "out.mcap"))
     files[1].write_text("J1\n1\n2\n3\n4\n5\n6\n")
-    with pytest.raises(RigtwinError, match="same rows; they have: pos 300, curr 6"):
+    with pytest.raises(RigtwinError, match="equal numbers of rows; they have: pos 300, curr 6"):
         convert(files, tmp_path / "map.toml", tmp_path / "out.mcap")
 
 

@@ -177,7 +177,8 @@ def test_a_channel_that_is_no_number_in_one_message_is_left_out_with_a_note(tmp_
     recording = rigtwin.load(recorded(tmp_path / "r.mcap", messages))
     assert recording.channels == ("/sensor.x",)
     assert recording.notes == (
-        "/sensor.force is no number in 1 messages, the first is message 4; the channel is left out",
+        "/sensor.force is not a number in 1 messages, the first is message 4; "
+        "the channel is left out",
     )
 
 

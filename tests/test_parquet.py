@@ -74,8 +74,8 @@ def test_coded_columns_structures_and_lists_are_taken_apart(tmp_path: Path):
         ([[1.0], [1.0, 2.0], []], "lists of 0 to 2 values; expected one length"),
         ([[1.0], None, [2.0]], "it holds no list in row 2"),
         ([[0.0] * 5000] * 3, "lists of 5000 values; expected at most 1024"),
-        ([b"a", b"b", b"c"], "it holds binary, which is no number"),
-        ([None, None, None], "it holds null, which is no number"),
+        ([b"a", b"b", b"c"], "it holds binary, which is not numeric"),
+        ([None, None, None], "it holds null, which is not numeric"),
     ],
     ids=["words", "ragged", "missing", "picture", "binary", "null"],
 )

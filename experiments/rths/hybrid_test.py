@@ -231,7 +231,7 @@ def _split_law(law: Law) -> tuple[LinearLaw, AdaptiveLaw]:
 
 def _draw(noise: Noise, ticks: int, seed: int) -> Array:
     """Return the noise of position and force, V, shape (2, ticks), each value held for `HELD`."""
-    # A stream apart from that of the plants, so that noise and plants are independent.
+    # An independent random stream: noise and plants do not share random numbers.
     random = np.random.default_rng([seed, 3])
     # The noise of the real converters is band-limited: one value holds for `HELD`.
     index = (np.arange(ticks) * PERIOD / HELD).astype(int)

@@ -116,7 +116,7 @@ def sheet(
     rows: int, columns: int, width: float = 11.0, height: float = 3.0
 ) -> tuple[Figure, list[list]]:
     """Return an empty figure and its axes in rows; width: of the figure, height: of a row, inch."""
-    # A figure of its own, without pyplot: jobs of several threads draw without global state.
+    # Threads draw at the same time, so the figure bypasses pyplot and its global state.
     figure = Figure(figsize=(width, height * rows), layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.subplots(rows, columns, squeeze=False)

@@ -200,7 +200,7 @@ def _show(rest: Sequence[RestReading]) -> None:
 
 
 def _parse_values(texts: Sequence[str], option: str) -> dict[str, float]:
-    """Return input → value of each NAME=VALUE. Raises RigtwinError if a value is no number."""
+    """Return input → value of each NAME=VALUE. Raises RigtwinError if a value is not a number."""
     values = dict[str, float]()
     for text in texts:
         name, _, value = text.partition("=")

@@ -2,7 +2,7 @@
 
 Dry friction is set-valued: at rest it bears any force up to the limits that `dry_limits` returns.
 The law is Coulomb, Stribeck and viscous friction (Armstrong-Hélouvry, Dupont and Canudas de Wit,
-Automatica 30(7), 1994). `docs/theory.md` derives the equations.
+Automatica 30(7), 1994); `Guide` states its equations. `docs/theory.md` says which load counts.
 """
 
 from __future__ import annotations

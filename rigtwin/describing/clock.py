@@ -35,7 +35,7 @@ class Clock:
     resample
         Period to which uneven rows are resampled, s; None where the steps are even.
     why
-        Reason for the column and its unit, for people.
+        Reason for the column and its unit, for the printed table.
     assumed
         Whether the unit or the column was concluded and not stated.
     """

@@ -61,7 +61,7 @@ def force_signals(
 
 
 def force_signal(log: Log, joint: str) -> LogSignal | None:
-    """Return the force at a joint as the log has it; None where a question is open.
+    """Return the logged force at a joint; None where a question is open.
 
     Parameters
     ----------

@@ -48,9 +48,9 @@ class Meaning:
 
 
 def split_words(name: str) -> tuple[str, ...]:
-    """Return the words and numbers of a name, in small letters.
+    """Return the words and numbers of a name, in lower case.
 
-    Words end at signs, at a capital after a small letter, and between letters and digits:
+    Words end at signs, at a capital after a lower-case letter, and between letters and digits:
     `leftElbow.pos[3]` has the words left, elbow, pos, 3.
 
     Parameters

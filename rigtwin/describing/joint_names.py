@@ -1,4 +1,4 @@
-"""The names by which a log can mean a joint: its own, and those of its actuators and sensors."""
+"""Names that identify a joint in a log: its own, and those of its actuators and sensors."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ MEASURES = {
     "velocity": JointQuantity.VELOCITY,
     "force": JointQuantity.FORCE,
 }
-"""Measure of an MJCF's sensor → quantity."""
+"""Quantity that an MJCF sensor measures, by the name of the measure."""
 
 
 @dataclass(frozen=True)
 class Alias:
-    """Name that means a joint.
+    """Name that identifies a joint.
 
     Parameters
     ----------
@@ -29,9 +29,9 @@ class Alias:
     words
         Words of the alias.
     quantity
-        Quantity that the whole name stands for, of a sensor or an actuator. None for a joint.
+        Quantity of the sensor or actuator with this name. None for the name of a joint.
     name
-        The name as the model has it.
+        Name as written in the model.
     """
 
     joint: str
@@ -41,10 +41,10 @@ class Alias:
 
 
 def list_aliases(mechanism: Mechanism) -> list[Alias]:
-    """Return all names that mean a hinge or slide of a model.
+    """Return all names that identify a hinge or slide of a model.
 
-    Of each name there is a second form without the words that say nothing of which joint it is,
-    such as joint, servo, encoder or position.
+    Each name comes in two forms: complete, and without words that do not tell joints apart, such as
+    joint, servo, encoder or position.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def list_aliases(mechanism: Mechanism) -> list[Alias]:
             continue
         words = split_words(name)
         telling = tuple(word for word in words if word not in QUANTITY_WORDS | MEASURED | COMMANDED)
-        # A number alone names no joint: every numbered column would fit it.
+        # A number alone does not identify a joint: it would match any numbered column.
         short = telling if any(not word.isdigit() for word in telling) else ()
         for form in (words, short):
             if form:

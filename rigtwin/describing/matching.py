@@ -31,7 +31,7 @@ class Match:
     quantity
         Quantity that the column holds.
     why
-        Reason, for people.
+        Reason, for the printed table.
     rank
         Quality of the match; of two columns for one quantity the higher one is taken.
     """

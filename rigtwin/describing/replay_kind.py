@@ -23,7 +23,7 @@ class ReplayKind:
     test
         One of the kinds that a description knows.
     why
-        Reason, for people.
+        Reason, as printed with the kind.
     """
 
     test: str

@@ -56,5 +56,5 @@ class LogSignal:
 
     @property
     def source(self) -> str:
-        """Column or formula with its sign, for people."""
+        """Column or formula with its sign, for messages."""
         return f"{'-' if self.sign < 0.0 else ''}{self.column or self.formula}"

@@ -381,7 +381,7 @@ class Components:
         return component
 
     def _servo(self, where: str, mjcf: str) -> dict[str, float]:
-        """Return the parameters of a servo that the MJCF states; note an actuator that is none."""
+        """Return the parameters of a servo that the MJCF states; note any other actuator."""
         parameters = self._mechanism.servo(mjcf)
         if parameters is None:
             self.mistakes.note(

@@ -323,8 +323,8 @@ class _Reader:
         return FormulaControl(output, compiled, channels, exact)
 
     def _controller_settings(self, settings: object) -> dict[str, float] | None:
-        """Return the controller's settings by name; None for a table that is none, or a name that
-        a formula cannot contain."""
+        """Return the controller's settings by name; None if they are not a table or have a name
+        that a formula cannot contain."""
         if not isinstance(settings, Mapping):
             self._mistakes.note("[controller] settings", "expected a table of numbers")
             return None

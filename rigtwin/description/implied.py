@@ -87,8 +87,8 @@ def expand(
             _expand_replay(table, mechanism, implied, mistakes)
         else:
             implied.replays.append(table)
-    # A key of the description replaces the implied one. A table that is none stays as it is, so
-    # that the reader of the components notes it.
+    # A key of the description replaces the implied one. A value that is not a table stays, so that
+    # the reader of the components notes it.
     components: dict[str, Any] = {}
     for name, table in implied.components.items():
         changes = written.get(name, {})

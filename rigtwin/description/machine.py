@@ -203,7 +203,7 @@ class Machine:
     name
         Name of the machine, which its recordings carry.
     title
-        Title for people.
+        Title, for messages and reports.
     path
         Path of the description.
     model

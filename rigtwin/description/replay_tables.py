@@ -91,7 +91,7 @@ class Replays:
         return self._single_replay(where, name, table, movers, rows)
 
     def _read_movers(self, where: str, table: Mapping[str, Any]) -> list[str]:
-        """Return the components that move a replay; note names that are none."""
+        """Return the components that move a replay; note names of no component."""
         movers = table.get("moved_by", [])
         movers = [movers] if isinstance(movers, str) else movers
         known = [

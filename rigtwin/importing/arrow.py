@@ -15,9 +15,9 @@ from rigtwin.numerics.arrays import Array
 SECONDS: Mapping[str, float] = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 """Arrow's unit of time → its length, s."""
 DAY = 86_400.0
-"""s."""
+"""One day, s."""
 MOST_ITEMS = 1024
-"""Items of a list column up to which each becomes a column; longer lists are pictures or texts."""
+"""Longest lists whose items become columns. Longer lists are pictures or texts."""
 
 
 @dataclass
@@ -31,7 +31,7 @@ class Expansion:
     units
         Name → unit, of times and durations.
     wrong
-        Name → first cell of a text column that is no number, and its row.
+        Name → first cell of a text column that is not a number, and its row.
     refused
         Name → why a column cannot be read as numbers.
     """
@@ -93,7 +93,7 @@ def _expand(
         expansion.values[name], unit = convert(column)
         expansion.units |= {name: unit} if unit else {}
     else:
-        expansion.refused[name] = f"it holds {kind}, which is no number"
+        expansion.refused[name] = f"it holds {kind}, which is not numeric"
 
 
 def _field_of(column: Any, place: int) -> Any:
@@ -131,7 +131,7 @@ def _integers(column: Any, bits: int) -> Array:
 
 
 def _floats(column: Any) -> Array:
-    """Return a column as floats, not a number where it holds null."""
+    """Return a column as floats, with NaN for null."""
     import pyarrow
 
     # An unsafe cast rounds integers above 2^53, which is all that a float can do.

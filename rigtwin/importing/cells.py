@@ -26,7 +26,7 @@ class Numbers:
     Parameters
     ----------
     values
-        Shape (rows,); not a number where a cell holds none.
+        Numbers, shape (rows,); NaN where a cell holds no number.
     wrong
         First row whose cell is neither a number nor missing, and the cell; None without one.
     are_stamps

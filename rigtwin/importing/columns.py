@@ -1,4 +1,4 @@
-"""Columns of numbers, as they come out of another program's file."""
+"""Columns of numbers, as read from another program's file."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from rigtwin.importing.stamps import clock_of, stamps_of
 from rigtwin.numerics.arrays import Array
 
 MISSING = ("", "nan", "na", "n/a", "null", "none", "-", "#n/a", "inf", "-inf", "+inf")
-"""Cells that hold no value, in small letters."""
+"""Cells that hold no value, in lower case."""
 _THOUSANDS = re.compile(r"[+-]?\d{1,3}(\.\d{3})+,\d*([eE][+-]?\d+)?")
 """Number with a decimal comma and dots between thousands."""
 
@@ -25,21 +25,21 @@ class Columns:
     Parameters
     ----------
     values
-        Name → numbers, shape (rows,); not a number where a cell held none.
+        Name → numbers, shape (rows,); NaN where a cell holds no number.
     units
         Name → unit as the file spells it.
     form
-        Format of the file as it was read, for people.
+        Description of the file's format, for messages.
     notes
         Irregularities of the file, one line per irregularity.
     wrong
-        Name → first cell that should be a number and is none, and where it stands.
+        Name → first cell that is neither a number nor missing, and its place.
     listed
-        Columns of numbers that the file has, those that were not needed included.
+        All columns of numbers in the file, including those that were not read.
     refused
         Name → why the column cannot be read as numbers.
     episode
-        Column that numbers the episodes of a file that holds several; "" for a file of one.
+        Column with the number of the episode; "" if the file holds a single one.
     """
 
     values: Mapping[str, Array]
@@ -58,7 +58,7 @@ class Columns:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """All columns of numbers, those that were not needed included."""
+        """All columns of numbers, including those that were not read."""
         return tuple(dict.fromkeys((*self.listed, *self.values)))
 
 
@@ -69,8 +69,8 @@ def is_missing(cell: str) -> bool:
 
 def number_of(cell: str, decimal: str) -> float:
     """Return the number in a cell. Raises ValueError for any other cell."""
-    # With a decimal comma, dots separate thousands; a cell with a dot alone is ambiguous, and
-    # "1,234.5" has its signs the other way round.
+    # With a decimal comma, dots separate thousands. "1.234" is then ambiguous, and "1,234.5" has a
+    # decimal point: both are refused.
     if decimal == ",":
         if "." in cell and not _THOUSANDS.fullmatch(cell.strip()):
             raise ValueError(cell)
@@ -105,7 +105,7 @@ def numbers_of(cells: Sequence[str], decimal: str) -> tuple[Array, int | None]:
     Returns
     -------
     array
-        Shape (rows,), not a number where a cell holds none.
+        Numbers, shape (rows,); NaN where a cell holds no number.
     int or None
         The first row whose cell is neither a number nor missing.
     """
@@ -152,14 +152,14 @@ def join(tables: Mapping[str, Columns]) -> Columns:
     Raises
     ------
     RigtwinError
-        If they have different numbers of rows.
+        If the files have different numbers of rows, or one of them holds episodes.
     """
     if len(tables) == 1:
         return next(iter(tables.values()))
     rows = {name: table.rows for name, table in tables.items()}
     if len(set(rows.values())) > 1:
         counts = ", ".join(f"{name} {count}" for name, count in rows.items())
-        raise RigtwinError(f"files that are joined must have the same rows; they have: {counts}")
+        raise RigtwinError(f"joined files must have equal numbers of rows; they have: {counts}")
     for file, table in tables.items():
         if table.episode:
             raise RigtwinError(

@@ -31,7 +31,7 @@ class Format:
     title
         Name for messages, such as "LeRobot dataset (a folder)".
     endings
-        Endings of the file names, in small letters, with the dot.
+        Endings of the file names, in lower case, with the dot.
     read
         Reads the selected columns of a file or folder. Raises RigtwinError, or OSError.
     is_folder

@@ -106,7 +106,7 @@ def _numbers(name: str, column: Any, wrong: dict[str, str]) -> tuple[dict[str, A
             wrong[name] = f"{cells[row][:40]!r} in row {row + 1}"
         return {name: numbers}, ""
     if array.dtype.kind not in "fiub":
-        raise TypeError(f"it holds {array.dtype}, which is no number")
+        raise TypeError(f"it holds {array.dtype}, which is not numeric")
     array = array.astype(float)
     array[np.isinf(array)] = np.nan
     if array.ndim == 0:
@@ -119,13 +119,13 @@ def _numbers(name: str, column: Any, wrong: dict[str, str]) -> tuple[dict[str, A
 
 
 def _without_mask(column: Any) -> Array:
-    """Return a masked array as a plain one that is not a number where the mask hides a value."""
+    """Return a masked array as a plain one, with NaN where the mask hides a value."""
     if column.dtype.kind in "fiub":
         return column.astype(float).filled(np.nan)
     if column.dtype.kind in "Mm":
         return column.filled(column.dtype.type("NaT"))
     if np.ma.getmaskarray(column).any():
-        raise ValueError(f"it holds masked values of {column.dtype}, which is no number")
+        raise ValueError(f"it holds masked values of {column.dtype}, which is not numeric")
     return column.data
 
 
@@ -147,7 +147,7 @@ def _unpack(array: Array) -> Array:
 
 
 def _seconds(array: Any) -> Array:
-    """Return dates since 1970 or durations in s, not a number where there is none."""
+    """Return dates since 1970 or durations in s, with NaN for missing ones."""
     unit, count = np.datetime_data(array.dtype)
     # Years and months have no fixed length, so they become days first.
     if unit in ("Y", "M"):

@@ -15,11 +15,11 @@ LABELS = ("name", "names", "joint_names", "dof_names", "interface_names")
 PASSED_OVER = ("header", "layout", "__msgtype__", *LABELS)
 """Fields that hold no signal."""
 MOST_ITEMS = 256
-"""Items of a list up to which each is a signal; longer ones are pictures and clouds of points."""
+"""Longest list whose items become signals. Longer lists are pictures and point clouds."""
 MEASURED = ("sensor_msgs/", "geometry_msgs/", "nav_msgs/")
 """Packages of messages that hold measurements; all others hold commands and states."""
 SECOND = 1_000_000_000
-"""ns."""
+"""One second, ns."""
 TRAJECTORY = "trajectory_msgs/msg/JointTrajectory"
 
 
@@ -33,15 +33,15 @@ def list_numbers(
     message
         Message as `rosbags` reads it.
     prefix
-        Name before those of the fields.
+        Text put before every field name.
     labels
-        Names of the joints, where an outer message has them.
+        Joint names of the enclosing message, for a message without names.
 
     Yields
     ------
     tuple
         `.field`, `.field.inner`, `.position[shoulder]` or `.data[0]`, and the number. Items of a
-        list are named by the joints if the message names as many, else numbered.
+        list are named after the joints if the list has one item per joint, and numbered otherwise.
     """
     labels = _labels_of(message) or labels
     for entry in fields(message):
@@ -80,13 +80,13 @@ def time_of(value: Any) -> int | None:
 
 
 def stamp_of(message: Any) -> int | None:
-    """Return the time in a message's header, ns; None if it has none, or 0, which is unset."""
+    """Return the time in a message's header, ns; None without a stamp, and for an unset one (0)."""
     stamp = getattr(getattr(message, "header", None), "stamp", None)
     return (time_of(stamp) or None) if stamp is not None else None
 
 
 def list_points(message: Any) -> Iterator[tuple[int, list[tuple[str, float]]]]:
-    """Yield the points of a trajectory: the time since its start, ns, and the numbers by name."""
+    """Yield the time since the trajectory's start, ns, and the named numbers of each point."""
     for point in message.points:
         numbers = [
             (name, number)

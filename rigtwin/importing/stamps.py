@@ -12,7 +12,7 @@ from dateutil import parser
 from rigtwin.numerics.arrays import Array
 
 DAY = 86_400.0
-"""s."""
+"""One day, s."""
 _CLOCK = re.compile(r"(\d{1,2}):(\d{2})(?::(\d{2}(?:[.,]\d+)?))?\s*([ap]m)?", re.IGNORECASE)
 _ISO = re.compile(r"\d{4}-\d{2}-\d{2}([T ].*)?")
 _DATE = re.compile(r"\d{1,4}[./-](\d{1,2}|[A-Za-z]{3,9})[./-]\d{2,4}(\D.*)?")

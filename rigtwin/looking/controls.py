@@ -11,7 +11,7 @@ from rigtwin.looking.knob import Knob, knob_of
 from rigtwin.looking.look import Look
 
 FEW = 8
-"""Number of sliders up to which all folders are open."""
+"""Largest number of sliders with which all folders are open."""
 
 
 class Controls:

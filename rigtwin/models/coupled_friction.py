@@ -1,13 +1,14 @@
 """Dry friction of guides that act on each other, by projected Gauss-Seidel. Compiled.
 
-The friction of one guide changes the velocity along all others. With the velocities w_g without any
-dry friction and the responses C_gj to 1 N at guide j over the step, the friction forces F satisfy
+The friction of one guide changes the velocity along all others. Let w_g be the velocity along guide
+g without any dry friction, and C_gj the velocity that 1 N of friction at guide j takes from it over
+a step. The friction forces F satisfy
 
     v_g = w_g − Σ_j C_gj·F_j,   F_g = clip(k_g·stretch(v_g), −backward_g, forward_g)
 
-Each sweep solves guide after guide, with the friction of the others as it was last (Jourdan, Alart
-and Jean, Computer Methods in Applied Mechanics and Engineering 155, 1998). The limits make it a
-projection, which converges because the responses are a positive semidefinite matrix.
+Each sweep solves one guide after another, with the others' friction at its latest value (Jourdan,
+Alart and Jean, Computer Methods in Applied Mechanics and Engineering 155, 1998). The limits are a
+projection. The iteration converges because the matrix C is positive semidefinite.
 """
 
 from __future__ import annotations
@@ -22,9 +23,11 @@ from rigtwin.models.forward_arrays import GuideContacts, State, WorkSpace
 from rigtwin.numerics.cholesky import solve
 from rigtwin.numerics.compiling import kernel
 
-SWEEPS, CONVERGED = 200, 1e-10
-"""Maximum number of Gauss-Seidel sweeps. The sweeps end once no friction force changes by more than
-this share of the largest friction limit."""
+SWEEPS = 200
+"""Maximum number of Gauss-Seidel sweeps."""
+CONVERGED = 1e-10
+"""Largest change of a friction force at which the sweeps end, as a share of the largest friction
+limit."""
 BACKLASH = Guide._fields.index("backlash")
 
 
@@ -70,14 +73,14 @@ def bear(
     if -half <= unopposed <= half:
         return 0.0
     stretched = unopposed - math.copysign(half, unopposed)
-    # The friction shortens the spring that it stretches, hence the denominator.
+    # The friction slows the guide and so reduces its own spring's stretch: hence the denominator.
     force = spring * stretched / (1.0 + h * spring * compliance)
     return min(max(force, -backward), forward)
 
 
 @inlined
 def find_responses(contacts: GuideContacts, free: np.ndarray, h: float, work: WorkSpace) -> float:
-    """Find the velocities without dry friction, and the responses to 1 N of it at each guide.
+    """Find velocities without dry friction, and their response to 1 N of friction at each guide.
 
     Returns the largest limit of any dry friction, N.
     """
@@ -88,8 +91,8 @@ def find_responses(contacts: GuideContacts, free: np.ndarray, h: float, work: Wo
             continue
         largest = max(largest, work.forward[g], work.backward[g])
         for a in range(loose):
-            # An impulse of h·1 N along the guide, whose response is M⁻¹·a·h by the factor of the
-            # step.
+            # Impulse of 1 N over the step h along the guide's direction a. The step's Cholesky
+            # factor gives the response, M⁻¹·a·h.
             work.column[a] = h * contacts.along[g, free[a]]
             work.unrubbed[g] += contacts.along[g, free[a]] * work.right[a]
         solve(work.system, loose, work.column)
@@ -104,7 +107,7 @@ def find_responses(contacts: GuideContacts, free: np.ndarray, h: float, work: Wo
 
 @inlined
 def rub(contacts: GuideContacts, free: np.ndarray, state: State, h: float, work: WorkSpace) -> None:
-    """Find the dry friction of all guides, and take its effect from the free velocities."""
+    """Find the dry friction of all guides, and subtract its effect from the free velocities."""
     guides, loose = len(contacts.springs), len(free)
     largest = find_responses(contacts, free, h, work)
     for _ in range(SWEEPS):
@@ -128,7 +131,7 @@ def rub(contacts: GuideContacts, free: np.ndarray, state: State, h: float, work:
             )
             changed = max(changed, abs(friction_force - work.dry[g]))
             work.dry[g] = friction_force
-        # A single guide converges in one sweep, and ends after the second.
+        # With a single guide, the first sweep is exact and the second one ends the loop.
         if changed <= CONVERGED * largest:
             break
     for g in range(guides):

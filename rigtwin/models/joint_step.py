@@ -83,7 +83,7 @@ def _carry(
     outer: float,
 ) -> tuple[float, float, float, float]:
     """Advance a joint without a servo's damping; arguments as in `step_joint`."""
-    # A call of its own: the compiler's SSA pass mistakes two inlined copies in one loop.
+    # A separate function: the compiler's SSA pass mishandles two inlined copies in one loop.
     return step_joint(guide_step, mass, state, pushed, 0.0, outer)
 
 

@@ -59,7 +59,7 @@ class _VerifiedFiles(IndexDataCacheFile):
 
     @classmethod
     def like(cls, files: IndexDataCacheFile) -> _VerifiedFiles:
-        """Return verified files at the place of plain ones."""
+        """Return verified files at the same paths as numba's unverified ones."""
         made = cls.__new__(cls)
         made.__dict__.update(files.__dict__)
         return made
@@ -86,7 +86,7 @@ class _VerifiedFiles(IndexDataCacheFile):
 
     @contextmanager
     def _open_for_write(self, filepath: str) -> Iterator[Any]:
-        # The file is complete on disk before it takes its name; a power failure leaves the old one.
+        # A temporary file is written completely, then renamed: a power failure leaves the old file.
         content = BytesIO()
         yield content
         data = content.getvalue()

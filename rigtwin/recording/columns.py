@@ -21,7 +21,7 @@ from rigtwin.recording.schema import decode_rows
 def decode_columns(
     path: Path, channel: Channel, schema: Schema | None, data: list[bytes], notes: list[str]
 ) -> dict[str, Array]:
-    """Decode the columns of a topic; columns of the channel table come first.
+    """Decode the columns of a topic. Fields listed in `channels` come first.
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ def decode_columns(
     data
         Messages in order.
     notes
-        Notes on the file, to which channels are added that are left out.
+        Notes on the file. A note on each channel that is left out is appended.
 
     Returns
     -------
@@ -42,7 +42,7 @@ def decode_columns(
     Raises
     ------
     RigtwinError
-        If a message cannot be read, or a field is not a number in all of them.
+        If a message cannot be read, or lacks a number in a field listed in `channels`.
     """
     names = topic_fields(channel.topic)
     if channel.message_encoding == "json":
@@ -52,9 +52,9 @@ def decode_columns(
     elif channel.message_encoding == "protobuf":
         if schema is None:
             raise RigtwinError(f"{path}: {channel.topic} is protobuf without a schema")
-        # The compiled layout applies only if the tags are those of `encode_rows`, in its order.
         present, numbers, decode = _protobuf(path, schema)
-        # Messages of doubles numbered 1, 2, … have equal lengths: numpy decodes a whole block.
+        # `encode_rows` writes doubles numbered 1, 2, …, so all messages have one length and numpy
+        # decodes them as a block. `decode_rows` returns None if the messages deviate from this.
         if numbers == list(range(1, len(present) + 1)):
             values = decode_rows(b"".join(data), len(data), len(present))
             if values is not None:
@@ -97,7 +97,7 @@ def _decode_singly(
 
 
 def _json_at_once(data: list[bytes]) -> list[Mapping[str, Any]] | None:
-    """Decode flat JSON objects as one array, twice as fast as singly; None for anything else."""
+    """Decode flat JSON objects in one call, which is twice as fast; None for any others."""
     # One brace pair means no nested object and, almost surely, no text with braces. A wrong guess
     # costs only time: the rows are checked below.
     if not all(item.count(b"{") == 1 == item.count(b"}") for item in data):
@@ -136,13 +136,13 @@ def _notes_on_left_out(
         missing = [type(row.get(name)) not in (int, float) for row in rows]
         if not all(missing):
             yield (
-                f"{topic}.{name} is no number in {sum(missing)} messages, the first is message "
+                f"{topic}.{name} is not a number in {sum(missing)} messages, the first is message "
                 f"{missing.index(True)}; the channel is left out"
             )
 
 
 def _column(path: Path, channel: str, values: list[Any]) -> Array:
-    """Return the values as an array. Raise RigtwinError for the first that is no number."""
+    """Return the values as an array. Raise RigtwinError for the first that is not a number."""
     for number, value in enumerate(values):
         # An exact test, because a JSON boolean is an int in Python.
         if type(value) is not float and type(value) is not int:
@@ -159,9 +159,9 @@ def _column(path: Path, channel: str, values: list[Any]) -> Array:
 def _protobuf(
     path: Path, schema: Schema
 ) -> tuple[list[str], list[int], Callable[[bytes], Mapping[str, Any]]]:
-    """Return field names and numbers of a message type, and a decoder of its messages.
+    """Return field names and field numbers of a message type, and a decoder of its messages.
 
-    The numbers are empty unless all fields are doubles.
+    The list of field numbers is empty unless all fields are doubles.
     """
     try:
         files = descriptor_pb2.FileDescriptorSet.FromString(schema.data)
@@ -173,7 +173,7 @@ def _protobuf(
     except (KeyError, TypeError, DecodeError) as error:
         raise RigtwinError(f"{path}: schema {schema.name!r} cannot be read: {error}") from None
     names = [item.name for item in kind.fields]
-    # Other types have other lengths; they are decoded one by one.
+    # Messages with fields of other types vary in length and are decoded one by one.
     doubles = all(item.type == item.TYPE_DOUBLE for item in kind.fields)
     message_class = message_factory.GetMessageClass(kind)
 

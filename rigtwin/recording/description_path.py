@@ -9,8 +9,8 @@ from pathlib import Path
 KEY = "description"
 """Key of the path in the metadata record that says what the test was."""
 FARTHEST = 2
-"""Folders above the recording up to which a description belongs to the same project, which may be
-moved as a whole: its path is then stored relative to the recording."""
+"""Number of folders above the recording within which a description belongs to the same project.
+Its path is then stored relative to the recording, so that the project can be moved."""
 
 
 def description_values(recording: Path, description: Path | None) -> dict[str, str]:

@@ -122,8 +122,8 @@ def read_records(file: BinaryIO) -> Iterator[McapRecord | Messages | Lost]:
     """
     # A corrupt length must not make the reader allocate more than the file holds.
     size = os.fstat(file.fileno()).st_size
-    # mcap checks the data section's checksum here, and cannot after a resumption, which has not
-    # seen the beginning. Every chunk has a checksum of its own besides.
+    # mcap checks the data section's checksum here. It cannot after a resumption, which skips the
+    # beginning. Every chunk also has its own checksum.
     reader = _Reader(file, emit_chunks=True, validate_crcs=True, record_size_limit=size)
     known, resumed, begun = 0, -1, False
     while True:
@@ -297,7 +297,7 @@ def find_chunk(data: bytearray | mmap.mmap, start: int) -> int | None:
 
 
 def seal(values: Mapping[str, str]) -> dict[str, str]:
-    """Return metadata with a checksum of themselves."""
+    """Return metadata with a checksum of their entries."""
     return {**values, _CHECKSUM: _checksum(values)}
 
 

@@ -39,7 +39,7 @@ _DOUBLE_WIRE_TYPE = 1
 
 def type_name(topic: str) -> str:
     """Return the full name of a topic's message type, such as `rigtwin.Command`."""
-    # Protobuf's style: message types in capitals, fields in small letters.
+    # Protobuf's style: message types begin with a capital, fields are in lower case.
     return "rigtwin." + topic.strip("/").capitalize()
 
 

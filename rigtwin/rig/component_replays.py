@@ -36,12 +36,12 @@ from rigtwin.simulation.plant import initial_deflection, initial_yield
 from rigtwin.simulation.runner import simulate, without_limits
 
 RESOLVED_OVER = 0.03
-"""Time in which a moving travel must exceed the LVDT's noise, s. Slower motion counts as
-standstill."""
+"""Time within which the travel must change by more than the LVDT's noise, s. Slower motion counts
+as standstill."""
 CERTAIN = 3.0
-"""Standard deviations of a velocity beyond which its sign is certain."""
+"""Number of standard deviations from zero beyond which a velocity's sign is certain."""
 CLOSED_LOOP_SEED = 2**31 - 1
-"""Seed of the twin's noise in the closed loop, which a recording of a twin is unlikely to have."""
+"""Seed of the twin's noise in the closed loop. Recordings of a twin are unlikely to share it."""
 
 
 class Undetermined(Exception):
@@ -69,7 +69,7 @@ class ComponentReplays:
         return self.recording.column("/command", name)
 
     def _clean(self, signal: Array) -> Array:
-        # The line of the mains is not white: it would count as a gap of every component.
+        # Mains hum is not white noise: unless removed, it would add to every component's residual.
         return remove_mains(signal, self.period, self.configuration.plant.mains.frequency)
 
     def _without_zero(self, name: str) -> Array:
@@ -90,8 +90,9 @@ class ComponentReplays:
         )
 
     def _motion(self, name: str, expected: Array) -> EstimatedMotion:
-        """Return the true motion behind a sensor's reading, from a replay's prediction of it."""
-        # The sensor is inverted for the correction alone, so the prediction keeps its sharp parts.
+        """Return the true motion behind a sensor's reading, given the motion a replay expects."""
+        # Only the correction passes through the inverse of the sensor, so the expected motion keeps
+        # its sharp edges.
         sensor = sensor_of(self.configuration.plant, name)
         mains = self.configuration.plant.mains.frequency
         estimate = estimate_motion(
@@ -114,7 +115,7 @@ class ComponentReplays:
         unloaded = replay_cylinder(cylinder, self.configuration, command, float(command[0]))
         if cylinder.compliance == 0.0:
             return unloaded
-        # The plate yields to the tyre's force, estimated from its measured deflection.
+        # The plate yields to the tyre's force, which follows from the tyre's measured deflection.
         tyre = self.configuration.plant.tyre.stiffness * (
             self._clean(self._sensor("ground_lvdt") - self.wheel)
         )
@@ -205,7 +206,7 @@ class ComponentReplays:
         output = replay_motor(
             self.configuration, travel.position, self._command("voltage"), self.preload
         )
-        # The travel must be faster than its noise and than the error of its estimate.
+        # The travel's speed must exceed both the LVDT's noise and the error of the estimate.
         resolved = (
             white_noise(self._sensor("suspension_lvdt")) / RESOLVED_OVER
             + CERTAIN * travel.velocity_error
@@ -213,7 +214,7 @@ class ComponentReplays:
         slides = np.abs(np.gradient(travel.position, self.period)) > resolved
         if not slides.any():
             raise Undetermined("the motor never slides fast enough for its friction to be known")
-        # Cleaned over the whole test, then restricted: the mains filter needs an unbroken signal.
+        # The mains filter needs an unbroken signal, so the restriction to sliding comes after it.
         difference = self._clean(measured - self._apply_sensor("load_cell", output))
         residual_rms = rms(difference[slides])
         floor = white_noise(measured)
@@ -222,7 +223,7 @@ class ComponentReplays:
             floor,
             residual_rms / floor if floor > 0 else math.inf,
             "N",
-            # Ticks at standstill count as zero in the spectrum, so that the time axis stays whole.
+            # The spectrum needs evenly spaced samples, so ticks at standstill are set to zero.
             band(difference * slides, self.period),
         )
 
@@ -231,7 +232,7 @@ class ComponentReplays:
         return self._residual(self.wheel, self._apply_lvdts(self.carriage_output), "m")[0]
 
     def mechanics(self) -> Residual:
-        """Return the residual of motor and carriage together, of force and wheel position."""
+        """Return the residual of force and wheel position of motor and carriage together."""
         force = self._apply_sensor("load_cell", self.mechanics_output.load_cell)
         pairs = {
             "load_cell": self._residual(self._sensor("load_cell"), force, "N"),

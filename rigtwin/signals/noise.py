@@ -25,7 +25,7 @@ HIGHEST_MOTION = 200.0
 
 
 SWITCHED = 4
-"""Number of different values up to which a signal counts as switched; its steps are no bits."""
+"""Largest number of values of a switched signal, whose steps do not show a converter's bits."""
 
 
 def white_noise(signal: Array) -> float:

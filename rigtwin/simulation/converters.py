@@ -73,8 +73,8 @@ class Disturbance:
     """
 
     def __init__(self, plant: RigPlant, period: float, seed: int) -> None:
-        # Each channel draws from a stream of its own. A change of one channel then leaves the
-        # others' noise as it was, and the numbers do not depend on the block size.
+        # Each channel draws from its own random stream. A change of one channel then leaves the
+        # others' noise unchanged, and the numbers do not depend on the block size.
         self._sensors = sensors(plant)
         self._radians = 2 * math.pi * plant.mains.frequency * period
         self._streams = [

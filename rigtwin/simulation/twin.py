@@ -56,7 +56,7 @@ class Twin:
         )
         self.disturbance = Disturbance(configuration.plant, configuration.timing.period, seed)
         self.sensing = build_sensing(configuration.plant, configuration.timing.period)
-        # A stream of its own: missed ticks do not change the noise.
+        # An independent random stream: missed ticks do not change the noise.
         self._missed = np.random.default_rng([seed, 2])
         self._share_missed = configuration.plant.computer.missed_ticks
         self.held = Commands(

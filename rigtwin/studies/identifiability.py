@@ -40,7 +40,7 @@ BASIC = ("coulomb", "viscous")
 FORCELESS = 1e-9
 """RMS of predicted forces, in N, below which a machine counts as free of forces."""
 RANK = 1e-10
-"""Relative singular value below which a direction of a set of changes is rounding."""
+"""Relative singular value below which a direction of a set of changes is rounding error."""
 EVALUATIONS = 12
 """Maximum number of evaluations when effects are fitted to another effect's change."""
 STEPS = 4

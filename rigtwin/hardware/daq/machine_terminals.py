@@ -45,8 +45,8 @@ class MachineTerminals:
         self._models = [transducer(getattr(plant, name), period) for name in self._names]
         self._states = [start_transducer(model) for model in self._models]
         self._inputs, self._outputs = conversion(wiring.inputs), conversion(wiring.outputs)
-        # A stream of its own for the sensors: a seed also draws other things, which must not be
-        # the same numbers.
+        # An independent random stream for the sensors: the seed also draws other quantities, which
+        # must not get the same numbers.
         self._random, self._place = np.random.default_rng([seed, 3]), AHEAD
         # Each sensor's hum has a random phase of its own.
         self._phases, self._drawn = self._random.uniform(0.0, 2.0 * np.pi, len(rows)), 0

@@ -48,7 +48,7 @@ class UncertainRig:
         Function of a configuration and a random generator that returns the configuration with a
         rig drawn from the distribution.
     known : frozenset of str
-        Parameters, `component.parameter`, that `draw` determines and tolerances must not vary.
+        Parameters that `draw` sets, as `component.parameter`. Tolerances do not vary them.
     certain : mapping
         Component → parameter → value known with certainty.
     """
@@ -71,14 +71,14 @@ def calibrated_rig(posterior: Posterior) -> UncertainRig:
 def draw_scenarios(study: Study, rig: UncertainRig, count: int, first: int) -> list[Scenario]:
     """Draw scenarios, each from its own seed.
 
-    More scenarios therefore leave the earlier ones unchanged. Tolerances and varied parameters are
-    uniform about the rig's values, and cut off at the parameters' bounds.
+    A larger count therefore leaves the first scenarios unchanged. Tolerances and varied parameters
+    are uniformly distributed about the rig's values and clipped to the parameters' bounds.
 
     Parameters
     ----------
     study : Study
         Study with the configuration and its variation.
-    rig : Rig
+    rig : UncertainRig
         Knowledge about the rig.
     count : int
         Number of scenarios.
@@ -88,7 +88,7 @@ def draw_scenarios(study: Study, rig: UncertainRig, count: int, first: int) -> l
     tolerances = study.machine.tolerances if study.variation.tolerances else ()
 
     def draw(seed: int) -> Scenario:
-        # A stream of its own beside the twin's noise, which has the same seed.
+        # The 3 makes this stream independent of the twin's noise, which has the same seed.
         random = np.random.default_rng([seed, 3])
         configuration = rig.draw(study.configuration, random)
 
