@@ -173,8 +173,8 @@ def document(chapters: Sequence[Chapter], every: bool) -> dict[str, object]:
 
 
 _GALLERY_HEAD = (
-    "`make gallery` writes this page. Figures show the nominal twin or closed forms. Only the force "
-    "loop's gains of Tables 4.1 and 4.2",
+    "`make gallery` writes this page. Figures show the nominal twin or closed forms. "
+    "Only the force loop's gains of Tables 4.1 and 4.2",
     "are tuned to the thesis, by the first row.",
     "",
     "Videos: [drop](gallery/drop.mp4), [road](gallery/road10.mp4), [beams](gallery/beams.mp4).",

@@ -93,7 +93,7 @@ def _joints(
 
 
 def _dissipation(model: mujoco.MjModel, components: Mapping[str, Component]) -> Iterator[str]:
-    """Yield dry friction of joints, and tendons, that no component describes.
+    """Yield joints with dry friction, and tendons, that no component describes.
 
     MuJoCo treats dry friction as a constraint, and the models' inverse dynamics leaves constraints
     out. Components model the friction instead.

@@ -230,7 +230,7 @@ def _environment() -> Environment:
 
 
 def _step_units(answer: Answer) -> dict[str, tuple[float, str]]:
-    """Display unit of each signal's residual, and the factor from SI to it; one for all steps."""
+    """Factor from SI, and display unit, of each signal's residual; the same in all steps."""
     return {
         name: shorten(unit, *(step.residual[name] for step in answer.steps))
         for name, unit in answer.units.items()
@@ -238,7 +238,7 @@ def _step_units(answer: Answer) -> dict[str, tuple[float, str]]:
 
 
 def _sensor_units(overlays: Sequence[Overlay]) -> dict[str, tuple[float, str]]:
-    """Display unit of each sensor's errors, and the factor from SI to it; one for all rows."""
+    """Factor from SI, and display unit, of each sensor's errors; the same in all rows."""
     largest: dict[str, float] = {}
     for row in overlays:
         largest[row.sensor] = max(largest.get(row.sensor, 0.0), row.before, row.after)
