@@ -327,7 +327,7 @@ def test_a_joint_that_an_equality_ties_to_another_is_not_free(tmp_path: Path) ->
     path = tmp_path / "upright.toml"
     path.write_text(TABLES)
     _, mistakes = examine(path)
-    assert "an equality ties rail to pivot, so it goes with that; leave rail out" in mistakes[0]
+    assert "an equality ties rail to pivot, so it follows pivot; leave rail out" in mistakes[0]
 
 
 @pytest.mark.parametrize(

@@ -217,7 +217,7 @@ def test_a_free_joint_at_the_far_end_of_a_chain_is_refused(tmp_path: Path) -> No
     path.write_text(CHAIN_TOML.format(free='a", "c'))
     _, mistakes = examine(path)
     assert len(mistakes) == 1
-    assert "an equality ties c to b, so it goes with that; leave c out" in mistakes[0]
+    assert "an equality ties c to b, so it follows b; leave c out" in mistakes[0]
 
 
 def test_a_motor_on_a_joint_that_stands_still_is_refused(tmp_path: Path) -> None:

@@ -49,13 +49,15 @@ def test_a_study_shows_its_first_picture_and_links_the_others() -> None:
     pictures = [
         ("Figure 5.4", "The critical lag, b/k. Grey: the ideal mass.", "a.png"),
         ("Figure 5.6", "Bode plot.", "b.png"),
+        ("Figures 5.7, 5.8", "Root loci.", "c.png"),
+        ("Table 5.1", "Poles.", "d.png"),
     ]
     assert picture_lines(pictures) == [
         "**Figure 5.4.** The critical lag, b/k.",
         "",
         "![Figure 5.4](gallery/a.png)",
         "",
-        "Also [Figure 5.6](gallery/b.png).",
+        "Also [Figure 5.6](gallery/b.png), [5.7, 5.8](gallery/c.png), [Table 5.1](gallery/d.png).",
         "",
     ]
 

@@ -185,7 +185,7 @@ def test_a_mistake_is_reported_in_one_line(tmp_path, right, wrong, said):
 
 def test_ignored_parts_of_the_model_are_reported(tmp_path):
     machine = described_arm(tmp_path)
-    assert machine.overlooked == ("tendon belt: it is no component",)
+    assert machine.overlooked == ("tendon belt: no component describes it",)
     text = (tmp_path / "arm.xml").read_text()
     free = '<body pos="2 0 0"><freejoint name="ball"/><geom size=".1"/></body></worldbody>'
     (tmp_path / "arm.xml").write_text(text.replace("</worldbody>", free))

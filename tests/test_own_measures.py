@@ -74,7 +74,7 @@ def test_a_measure_is_its_formula_over_what_counts(formula: str, of: str, value:
     ("table", "said"),
     [
         ({"formula": "speed"}, "measures.m.formula: unknown 'speed'; expected time, reference"),
-        ({"formula": "1 + 2"}, "expected a channel in it"),
+        ({"formula": "1 + 2"}, "expected at least one channel"),
         ({"formula": "position +"}, "measures.m.formula: "),
         ({"of": "rms"}, "measures.m.formula = None: expected text"),
         ({"formula": "position", "of": "worst"}, "expected rms, deviation, mean, peak"),

@@ -161,11 +161,11 @@ def test_another_setting_is_another_session(tmp_path):
             ["--target", "daq", "--card", "nowhere.toml"],
             "channel table nowhere.toml does not exist",
         ),
-        (["--dry-run"], "--dry-run goes with --target daq"),
-        (["--arm"], "--arm goes with --target daq"),
-        (["--live"], "--live goes with --card or --real-time"),
-        (["--card", "CARD", "--arm"], "go with --target daq"),
-        (["--card", "CARD", "--live"], "--live goes with a session in real time"),
+        (["--dry-run"], "--dry-run requires --target daq"),
+        (["--arm"], "--arm requires --target daq"),
+        (["--live"], "--live requires --card or --real-time"),
+        (["--card", "CARD", "--arm"], "require --target daq"),
+        (["--card", "CARD", "--live"], "--live requires a session in real time"),
         (["--target", "daq", "--card", "CARD"], "the NI-DAQmx driver is missing"),
         (["--target", "daq", "--card", "UNSIGNED"], "sign not checked: ground_lvdt"),
         (
@@ -598,7 +598,7 @@ def test_a_list_is_run_on_the_twin_of_any_machine(tmp_path, capsys):
         (["--card", "card.toml"], "channel table card.toml does not exist"),
         (["--target", "daq"], "--target daq needs the card's channel table"),
         (["--real-time"], "--real-time of bench needs a channel table of it"),
-        (["--dry-run"], "--dry-run, --without-dry-run and --arm go with --target daq"),
+        (["--dry-run"], "--dry-run, --without-dry-run and --arm require --target daq"),
     ):
         assert main([*session[:-1], str(tmp_path / "new"), *option]) == 1
         error = capsys.readouterr().err

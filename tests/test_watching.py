@@ -325,4 +325,4 @@ def test_the_command_says_in_its_exit_code_whether_there_was_an_alarm(nominal, c
 def test_effects_from_a_time_on_are_not_of_a_session(capsys):
     command = ["run", "imposed", "--effect", "coulomb@rail=60", "--effects-from", "3"]
     assert main([*command, "--real-time"]) == 1
-    assert "--effects-from does not go with" in capsys.readouterr().err
+    assert "--effects-from does not work with" in capsys.readouterr().err

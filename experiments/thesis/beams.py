@@ -30,9 +30,9 @@ TABLE_7_5 = {"bent passive": "0.679", "semi-active": "0.256", "active": "0.227"}
 The passive test with straight beams diverges on the twin, see `RUNS_AWAY`.
 """
 RUNS_AWAY = (
-    "with beams that start straight, as in Fig. 7.15, the centre's first swing asks 0.72 m/s of a "
-    "cylinder that gives 0.3, and the passive twin runs away; these are of beams that start bent "
-    "by the preload, whose drop is smaller"
+    "with initially straight beams (Fig. 7.15) the first swing asks 0.72 m/s of a 0.3 m/s "
+    "cylinder, and the passive twin diverges; these entries are of beams bent by the preload, "
+    "whose drop is smaller"
 )
 ON_A_SPRING = 1000.0
 """Stiffness of the spring under the centre, N/m, that shifts the modes in Figure 7.16."""

@@ -74,6 +74,15 @@ def agreement_lines(rows: Iterable[tuple[str, str, str]]) -> list[str]:
     return lines
 
 
+def _drop_repeated_kind(names: Sequence[str]) -> list[str]:
+    """Return names without the word `Figure` or `Table` where the name before has the same one."""
+    kinds = [name.partition(" ")[0].removesuffix("s") for name in names]
+    return [
+        name.partition(" ")[2] if kind == before and kind in ("Figure", "Table") else name
+        for name, kind, before in zip(names, kinds, ["", *kinds], strict=False)
+    ]
+
+
 def picture_lines(pictures: Sequence[tuple[str, str, str]]) -> list[str]:
     """Return the first picture of a study with its caption's first sentence, and links to others.
 
@@ -91,6 +100,8 @@ def picture_lines(pictures: Sequence[tuple[str, str, str]]) -> list[str]:
     sentence = re.split(r"(?<=\.) (?=[A-Z])", caption)[0]
     lines = [f"**{covers}.** {sentence}".rstrip(), "", f"![{covers}](gallery/{file})", ""]
     if len(pictures) > 1:
-        links = [f"[{name}](gallery/{file})" for name, _, file in pictures[1:]]
+        names = _drop_repeated_kind([name for name, _, _ in pictures[1:]])
+        files = [file for _, _, file in pictures[1:]]
+        links = [f"[{name}](gallery/{file})" for name, file in zip(names, files, strict=True)]
         lines += [f"Also {', '.join(links)}.", ""]
     return lines

@@ -36,8 +36,7 @@ TESTS = {
 }
 """Test → its table, with the printed force error in N and %, and position error in m and %."""
 OFFSET = (
-    "0.06 m (60 %) in every test and every table: an offset of "
-    "the zero, which Figures 6.24 to 6.51 contradict"
+    "0.06 m (60 %) in every test and table: a zero offset, which Figures 6.24 to 6.51 contradict"
 )
 SHARE = (
     "in % of the ideal force's rms about its mean; the thesis does "

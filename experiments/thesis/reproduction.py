@@ -173,9 +173,9 @@ def document(chapters: Sequence[Chapter], every: bool) -> dict[str, object]:
 
 
 _GALLERY_HEAD = (
-    "`make gallery` writes this page. Every figure is of the nominal twin or in closed form. "
-    "Nothing is tuned to the thesis but",
-    "the gains of the force loop of Tables 4.1 and 4.2, which are found from the first row alone.",
+    "`make gallery` writes this page. Figures show the nominal twin or closed forms. "
+    "Only the force loop's gains of Tables 4.1 and 4.2",
+    "are tuned to the thesis, by the first row.",
     "",
     "Videos: [drop](gallery/drop.mp4), [road](gallery/road10.mp4), [beams](gallery/beams.mp4).",
 )
@@ -221,8 +221,8 @@ def gallery(chapters: Sequence[Chapter], folder: Path, every: bool) -> Path:
     entries = [entry for chapter in chapters for entry in chapter.conclusion.entries]
     lines = ["# The thesis reproduced", "", *_GALLERY_HEAD, ""]
     lines += [
-        f"In all {count_agreeing(entries)} entries agree, statements and figures included. "
-        "`rigtwin reproduce --html thesis.html` has every entry and caption.",
+        f"{count_agreeing(entries)} entries agree, statements and figures included; "
+        "`rigtwin reproduce --html thesis.html` lists all.",
         "",
     ]
     lines += agreement_lines(
@@ -236,7 +236,8 @@ def gallery(chapters: Sequence[Chapter], folder: Path, every: bool) -> Path:
             drawings = chapter.conclusion.drawings
             if not drawings:
                 continue
-            lines += [f"## {chapter.study.title}", ""]
+            title = chapter.study.title
+            lines += [f"## {title[0].upper()}{title[1:]}", ""]
             shown = []
             for drawing in drawings:
                 name = f"{chapter.study.name}-{drawing.name}.png"

@@ -29,10 +29,10 @@ from rigtwin.signals.noise import rms
 from rigtwin.simulation.structure_motion import states, wing
 
 SHOWN_SEED = 0
-OFFSET = "the same 0.06 m (58 %) in every table: an offset of the zero"
+OFFSET = "0.06 m (58 %) in every table: a zero offset"
 LIMIT_CYCLE = (
-    "mostly the limit cycle by friction, whose size depends on the "
-    "force loop's gains; the thesis does not give them"
+    "mostly the limit cycle by friction, which depends on the force loop's gains; the thesis does "
+    "not give them"
 )
 TAXIING = 10.0
 """Time after which the drop has decayed and the road alone moves the car, s."""

@@ -73,7 +73,7 @@ def _tables() -> list[Entry]:
                     f"{PRINTED_LAG:g} s, and stable for some values of the sweep",
                     largest > PRINTED_LAG,
                     f"the critical lag is at most {largest:.3g} s in the sweep",
-                    "a misprint of 0.0333 s, with which the section's statements hold",
+                    "a misprint of 0.0333 s, for which the statements hold",
                 )
             )
     return entries

@@ -216,6 +216,4 @@ def _drawing(
         f"differ by {worst:.0e} of the peak at most; Table 3.3's figures with Table 3.2's 200 kg "
         f"by {100.0 * off:.0f} %."
     )
-    return Drawing(
-        "similitude", "landing in full size and at the rig's scale, §3.5", caption, figure
-    )
+    return Drawing("similitude", "Landing, §3.5", caption, figure)

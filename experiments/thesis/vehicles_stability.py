@@ -195,10 +195,7 @@ def _drawing(cars: Mapping[str, QuarterCar]) -> Drawing:
             axis.set_ylabel("position, mm", fontsize=8)
     handles, labels = axes[0][0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=3, fontsize=8, frameon=False)
-    caption = (
-        "The linear rig with four lags of 10 ms, the body let "
-        "go with a tenth of its weight unsupported."
-    )
+    caption = "The body let go with a tenth of its weight unsupported."
     return Drawing("vehicles-drop", "Figure 6.15 to 6.22", caption, figure)
 
 

@@ -13,7 +13,7 @@ from rigtwin.errors import RigtwinError
 from rigtwin.recording import reader
 
 Log = str | Path | Sequence[str | Path]
-"""Log of another program: a file, or several that are put side by side. A text "a.csv+b.csv" names
+"""Log of another program: a file, or several whose columns are joined. A text "a.csv+b.csv" names
 two files."""
 SEPARATOR = "+"
 """Separator of a log's files in one text."""
@@ -37,7 +37,7 @@ def describe(
     model
         File of the mechanics, MJCF or URDF.
     log
-        CSV, JSON, MATLAB or parquet file, or several that are put side by side, row by row.
+        CSV, JSON, MATLAB or parquet file, or several whose columns are joined row by row.
     columns
         Statements about the log that override its reading. "elbow.position" → a column with or
         without sign and unit ("-q2 [deg]"), a formula of columns, or "none"; ``"*.position"`` → a

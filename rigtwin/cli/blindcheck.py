@@ -31,7 +31,7 @@ forms that the library does not have."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--cases", type=int, help="how many (default 200; of rigs to tune for 8)")
+    parser.add_argument("--cases", type=int, help="number of cases (default 200; with --tune 8)")
     parser.add_argument(
         "--tune",
         metavar="STUDY",
@@ -68,7 +68,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--draw",
         type=Path,
         metavar="F.png",
-        help="with --wild: also draw how often names were right beside how sure they were",
+        help="with --wild: also draw the share of right names against their confidence",
     )
     add_workers(parser)
 

@@ -49,7 +49,7 @@ def _add_serve(deeds: Any) -> None:
     )
     _add_machine(serving)
     serving.add_argument("--seed", type=int, default=0, help="seed of the sensor noise (default 0)")
-    add_effect(serving, "give the rig an effect, e.g. coulomb@rail=80")
+    add_effect(serving, "simulate an effect, e.g. coulomb@rail=80")
     add_settings(serving)
 
 
@@ -72,7 +72,9 @@ def _add_check(deeds: Any) -> None:
     checking.add_argument("--note", default="", help="remark that is stored in the table")
     _add_corrections(checking)
     checking.add_argument(
-        "--arm", action="store_true", help="skip the question: everybody is clear of the rig"
+        "--arm",
+        action="store_true",
+        help="arm without asking; make sure that everybody is clear of the rig",
     )
     checking.add_argument(
         "--virtual",

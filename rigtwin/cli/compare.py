@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from rigtwin import Comparison, Recording
     from rigtwin.diagnosis.residual import Residual
 
-SUMMARY = "replay each component of a recording on the twin and say what is left"
+SUMMARY = "replay each component of a recording on the twin and print the residuals"
 MORE = """\
 One recording: motor, carriage, mechanics, both cylinders, controller and closed loop, each driven
 by measured signals; of another machine, signal by signal. A ratio of 1 means that noise is all that

@@ -27,7 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="+",
         required=True,
         metavar="LOG",
-        help="log of another program; several files are put side by side, row by row",
+        help="log of another program; the columns of several files are joined row by row",
     )
     add_columns(parser)
     parser.add_argument(

@@ -75,14 +75,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--changed",
         action="store_true",
-        help="say instead what is not the same in all recordings, given in the order of time",
+        help="find what changed between the recordings instead; give them in order of time",
     )
     parser.add_argument(
         "--each",
         type=Path,
         metavar="FOLDER",
         help="diagnose each recording by itself, and keep all answers in this folder; a second "
-        "call goes on where the first was stopped",
+        "call continues where the first was stopped",
     )
     add_workers(parser)
     add_machine(parser)
@@ -98,7 +98,7 @@ def _add_scope(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="EFFECT",
-        help="do not look for this, e.g. delay@motor, or delay at every component",
+        help="effect not to search for, e.g. delay@motor, or delay for every component",
     )
     add_held_out(parser)
 

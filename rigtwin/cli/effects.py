@@ -15,8 +15,8 @@ Give one to a test with rigtwin run NAME --effect KIND@COMPONENT=VALUE."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("component", nargs="?", help="only those of this component")
-    add_machine(parser, "of that machine", DEFAULT_MACHINE)
+    parser.add_argument("component", nargs="?", help="list only the effects of this component")
+    add_machine(parser, "machine", DEFAULT_MACHINE)
 
 
 def execute(parsed: argparse.Namespace) -> int:

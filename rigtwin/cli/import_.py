@@ -10,7 +10,7 @@ from rigtwin.console import writable
 SUMMARY = "make a recording of other programs' data"
 MORE = """\
 A map says which column is which channel, in what unit, and what the time base is;
-docs/importing.md explains it. Several files are put side by side, row by row. A data set
+docs/importing.md explains it. The columns of several files are joined row by row. A data set
 of several episodes becomes a recording of each, in the folder that -o names.
 
 examples:

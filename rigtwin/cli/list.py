@@ -15,9 +15,9 @@ rigtwin list --settings drop prints every setting of an experiment with unit, bo
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "--settings", metavar="NAME", help="the settings of that experiment instead"
+        "--settings", metavar="NAME", help="list the settings of this experiment instead"
     )
-    add_machine(parser, "of that machine", DEFAULT_MACHINE)
+    add_machine(parser, "machine", DEFAULT_MACHINE)
 
 
 def execute(parsed: argparse.Namespace) -> int:

@@ -61,7 +61,7 @@ def add_without(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="EFFECT",
-        help="take this out of the twin first, e.g. coulomb@rail",
+        help="effect to remove from the twin first, e.g. coulomb@rail",
     )
 
 
@@ -117,7 +117,7 @@ def read_recordings(
     paths, held_out = parsed.recordings, parsed.held_out
     if not needs_description(parsed.machine, paths):
         if stated or parsed.test:
-            raise RigtwinError("--column and --test: of logs beside a model, --machine arm.xml")
+            raise RigtwinError("--column and --test require a log and a model, --machine arm.xml")
         load = rigtwin.load
         return [load(p, parsed.machine) for p in paths], [load(p, parsed.machine) for p in held_out]
     described = rigtwin.describe(parsed.machine, paths[0], columns=stated, test=parsed.test)
@@ -130,7 +130,7 @@ def add_workers(parser: argparse.ArgumentParser) -> None:
         "--workers",
         type=int,
         metavar="N",
-        help="processes that work side by side (default: one a core)",
+        help="number of parallel processes (default: one per core)",
     )
     parser.add_argument(
         "--cluster", metavar="ADDRESS", help="work on a dask cluster instead, e.g. tcp://host:8786"
@@ -157,7 +157,7 @@ def add_json(parser: argparse.ArgumentParser, what: str) -> None:
 
 @contextmanager
 def counting_bar(unit: str, title: str) -> Iterator[Callable[[int, int], None]]:
-    """A progress bar on a terminal; what it gives is told what is done, and how much there is."""
+    """Yield a function that updates a progress bar with the jobs done and the total."""
     from tqdm import tqdm
 
     with tqdm(disable=None, desc=title, unit=unit, leave=False, file=sys.stderr) as bar:

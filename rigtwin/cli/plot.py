@@ -35,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="NAME",
-        help="draw those alone whose title begins so; several may be given",
+        help="draw only panels whose title begins with NAME; may be repeated",
     )
     add_stretch(parser)
 

@@ -33,7 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--compensator",
         default="kalman-inverse",
         metavar="NAME",
-        help="by name (default kalman-inverse)",
+        help="name of the compensator (default kalman-inverse)",
     )
     parser.add_argument(
         "--plants",
@@ -41,7 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="actuators to try: the nominal one, then drawn ones (default 1, with --tune 8)",
     )
     parser.add_argument(
-        "--noise", action="store_true", help="with the noise of the benchmark's converters"
+        "--noise", action="store_true", help="add the noise of the benchmark's converters"
     )
     parser.add_argument("--seed", type=int, default=1, help="seed of plants and noise (default 1)")
     parser.add_argument("--tune", action="store_true", help="tune the compensator first")

@@ -1,4 +1,4 @@
-"""`rigtwin run`: an experiment on the twin or the rig, into a recording."""
+"""`rigtwin run`: run an experiment on the twin or the rig, and record it."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ exit code 3: a limit tripped; the recording is kept."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("name", help="an experiment of rigtwin list")
-    add_machine(parser, "whose twin is run", DEFAULT_MACHINE)
+    parser.add_argument("name", help="name of an experiment; rigtwin list prints them")
+    add_machine(parser, "machine to simulate", DEFAULT_MACHINE)
     parser.add_argument(
         "--seed",
         type=int,
@@ -39,15 +39,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "-o",
         type=Path,
         metavar="F.mcap",
-        help="where to record; replaced if there (default NAME-SEED.mcap, numbered if there)",
+        help="file to write, replaced if it exists (default: NAME-SEED.mcap with a free number)",
     )
-    add_effect(parser, "give the rig an effect that its settings do not tell, e.g. coulomb@rail=80")
+    add_effect(parser, "simulate an effect that is not in the settings, e.g. coulomb@rail=80")
     parser.add_argument(
         "--effects-from",
         type=float,
         default=0.0,
         metavar="S",
-        help="the effects arise at this time of the test, in s (default: they are there)",
+        help="time of the test from which the effects act, in s (default: the start)",
     )
     add_settings(parser)
     add_supervised(parser)
@@ -62,20 +62,20 @@ def execute(parsed: argparse.Namespace) -> int:
 
     machine = rigtwin.machine(parsed.machine)
     experiment = find_experiment(machine, parsed.name)
-    # Without a name no recording is overwritten; a stated name may be.
+    # The default name is chosen so that no recording is overwritten; --out may overwrite one.
     path = parsed.out or _fresh(f"{experiment.name}-{parsed.seed}")
     if parsed.seed < 0:
         raise RigtwinError(f"--seed {parsed.seed}: expected 0 or more")
     if parsed.target == "daq" or parsed.card is not None or parsed.real_time:
-        # A supervised session runs the twin behind converters, which has its effects from the
+        # In a supervised session the twin runs behind converters and has its effects from the
         # start.
         if parsed.effects_from:
-            raise RigtwinError("--effects-from does not go with --target, --card and --real-time")
+            raise RigtwinError("--effects-from does not work with --target, --card or --real-time")
         return _run_supervised(parsed, machine, path)
     for option in ("dry_run", "arm", "without_dry_run", "stop_file", "live"):
         if getattr(parsed, option):
             needs = "--card or --real-time" if option in ("stop_file", "live") else "--target daq"
-            raise RigtwinError(f"--{option.replace('_', '-')} goes with {needs}")
+            raise RigtwinError(f"--{option.replace('_', '-')} requires {needs}")
     settings = settings_of(parsed)
     ticks = with_changes(experiment.configuration, settings).ticks
     shown = {"unit": "tick", "unit_scale": True, "desc": experiment.name, "leave": False}
@@ -110,8 +110,7 @@ def _run_supervised(parsed: argparse.Namespace, machine: Machine, path: Path) ->
     require_card(parsed, machine)
     if parsed.live and not (parsed.real_time or (parsed.target == "daq" and not parsed.dry_run)):
         raise RigtwinError(
-            "--live goes with a session in real time: --real-time, "
-            "or --target daq without --dry-run"
+            "--live requires a session in real time: --real-time, or --target daq without --dry-run"
         )
     writable(path)
     return run(parsed, parsed.name, path)

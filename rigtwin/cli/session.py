@@ -43,7 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="F.toml",
         help="the machine, by name or description (default: the suspension rig)",
     )
-    add_effect(parser, "give the twin an effect that its settings do not tell")
+    add_effect(parser, "simulate an effect that is not in the settings")
     add_settings(parser)
     add_supervised(parser)
 
@@ -87,7 +87,7 @@ def execute(parsed: argparse.Namespace) -> int:
 
 
 def _needs_card(parsed: argparse.Namespace) -> bool:
-    """Whether anything is asked that goes with a channel table alone."""
+    """Whether an option is set that requires a channel table."""
     asked = ("card", "dry_run", "real_time", "arm", "without_dry_run", "stop_file", "live")
     return parsed.target == "daq" or any(getattr(parsed, name) for name in asked)
 

@@ -29,14 +29,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--vehicle",
         default=TABLE_6_2,
         metavar="NAME",
-        help=f"by name (default {TABLE_6_2}: thesis Table 6.2)",
+        help=f"name of the vehicle (default {TABLE_6_2}: thesis Table 6.2)",
     )
     parser.add_argument(
         "--set",
         action="append",
         default=[],
         metavar="KEY=VALUE",
-        help="another value of it, e.g. suspension_damping=500",
+        help="override a parameter of the vehicle, e.g. suspension_damping=500",
     )
     parser.add_argument(
         "--tau", type=float, default=RIG_LAG, metavar="S", help="lag of every path (default 0.01)"
@@ -44,13 +44,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--delay",
         action="store_true",
-        help="the rightmost pole with pure delays of tau instead of lags",
+        help="give the rightmost pole for pure delays of tau instead of lags",
     )
     parser.add_argument(
         "--compensator",
         default=COMPENSATOR,
         metavar="NAME",
-        help=f"of the plate's delay on the rig as it runs (default {COMPENSATOR})",
+        help=f"compensator of the plate's delay on the sampled rig (default {COMPENSATOR})",
     )
     parser.add_argument(
         "--map",
@@ -59,7 +59,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="draw stability over two parameters, e.g. sprung_mass tau",
     )
     parser.add_argument(
-        "--model", metavar="NAME", help=f"of the map: one of those in the table (default {DRAWN})"
+        "--model", metavar="NAME", help=f"model of the map, one of the table's (default {DRAWN})"
     )
     parser.add_argument(
         "--out",

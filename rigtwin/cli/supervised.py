@@ -37,18 +37,20 @@ def add_supervised(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--dry-run",
         action="store_true",
-        help="with daq: the exact session on the virtual card first",
+        help="with --target daq: run the exact session on the virtual card instead",
     )
-    group.add_argument("--real-time", action="store_true", help="the twin at the pace of the clock")
+    group.add_argument(
+        "--real-time", action="store_true", help="run the twin at the pace of the clock"
+    )
     group.add_argument(
         "--arm",
         action="store_true",
-        help="do not ask before the rig is armed: everybody is clear of it",
+        help="arm without asking; make sure that everybody is clear of the rig",
     )
     group.add_argument(
         "--without-dry-run",
         metavar="NAME",
-        help="arm without a dry run; NAME answers for it, and is recorded",
+        help="arm without a dry run; NAME, who takes responsibility, is recorded",
     )
     group.add_argument(
         "--stop-file",
@@ -69,9 +71,9 @@ def add_supervised(parser: argparse.ArgumentParser) -> None:
 
 def require_card(parsed: argparse.Namespace, machine: Machine) -> None:
     """Raises RigtwinError for a session that needs a channel table and has none, or for options
-    that go with the card alone."""
+    that only a session on the card has."""
     if parsed.target == "twin" and (parsed.dry_run or parsed.without_dry_run or parsed.arm):
-        raise RigtwinError("--dry-run, --without-dry-run and --arm go with --target daq")
+        raise RigtwinError("--dry-run, --without-dry-run and --arm require --target daq")
     if parsed.card is None and parsed.target == "daq":
         raise RigtwinError("--target daq needs the card's channel table: --card CARD.toml")
     if parsed.card is None and parsed.real_time and machine.physics.card is None:

@@ -15,11 +15,13 @@ class ForceActuator(NamedTuple):
     """Actuator whose command becomes a force.
 
     Order of operations: limits of the command, delay, deadband, gain, saturation, rate limit, lag,
-    `constant`, limit of the force. The gain is gain·(1 ± ½·gain_asymmetry) and the deadband
-    deadband ± ½·deadband_asymmetry, with the upper sign for positive commands.
+    `constant`, limit of the force. With the upper sign for positive commands:
+
+        effective gain     = gain·(1 ± ½·gain_asymmetry)
+        effective deadband = deadband ± ½·deadband_asymmetry
     """
 
-    # Static law and limits, by the MJCF: force = constant · conditioned command.
+    # Static law and limits, read from the MJCF: force = constant · conditioned command.
     constant: Annotated[float, Quantity("N/unit of the command", 1e-9, 1e9, MJCF)] = 1.0
     force_limit: Annotated[float, Quantity("N", 1e-9, UNLIMITED, MJCF)] = UNLIMITED
     command_low: Annotated[
@@ -44,14 +46,14 @@ class ForceActuator(NamedTuple):
 
 
 class PositionActuator(NamedTuple):
-    """Actuator whose command becomes a position, whatever resists.
+    """Actuator whose command becomes a position, whatever force resists it.
 
     Order of operations: limits of the command, delay, deadband (a backlash), gain and offset,
     saturation, rate limit, first and second lag, resonance. Without any effect it follows its
     command at once.
     """
 
-    # Limits of the command, by the MJCF.
+    # Limits of the command, read from the MJCF.
     command_low: Annotated[float, Quantity("m", -UNLIMITED, UNLIMITED, MJCF)] = -UNLIMITED
     command_high: Annotated[float, Quantity("m", -UNLIMITED, UNLIMITED, MJCF)] = UNLIMITED
     # Static response: gain · command + offset.

@@ -44,7 +44,7 @@ CURVE = ("curve_2", "curve_3", "curve_4", "curve_5")
 FRAME = ("curve_middle", "curve_half_range")
 """Range of positions to which the coefficients refer."""
 TOLD = 7
-"""Number of positions at which a curve is told."""
+"""Number of positions at which a curve is reported."""
 SHORTEST = 1e-9
 """Shortest half range of a curve, m."""
 NEARLY = 0.1
@@ -456,7 +456,7 @@ def _curve(context: Context) -> Starts:
 
 
 def curve_points(values: Mapping[str, float]) -> Points:
-    """Return positions and forces that tell the curve of a position-dependent force, m and N."""
+    """Return positions and forces along the curve of a position-dependent force, m and N."""
     guide = Guide(**values)
     places = guide.curve_middle + guide.curve_half_range * np.linspace(-1.0, 1.0, TOLD)
     return tuple((float(place), curve(guide, float(place))) for place in places)

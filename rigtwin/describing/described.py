@@ -41,7 +41,7 @@ class Described:
     reading
         Conclusions from the log.
     log
-        Files of the log, put side by side.
+        Files of the log, whose columns are joined.
     description
         The description, TOML.
     mapping
@@ -79,7 +79,7 @@ class Described:
         Parameters
         ----------
         log
-            Files of another log with the same columns, put side by side. Defaults to the log that
+            Files of another log with the same columns, joined. Defaults to the log that
             the machine was described from.
 
         Raises
@@ -187,7 +187,7 @@ def describe_log(
     model
         MJCF or URDF.
     log
-        Files of the log, put side by side row by row.
+        Files of the log, whose columns are joined row by row.
     stated
         Statements of the log's owner: "elbow.position" → "q2 [deg]", "time" → "t [ms]".
     test

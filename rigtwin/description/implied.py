@@ -181,7 +181,7 @@ def _expand_replay(
         mistakes.note(where, f"test = {test!r}: no actuator acts on {', '.join(joints)}")
         return
     keys = {key: value for key, value in table.items() if key not in KEYS}
-    # Joints under position commands follow them whatever resists, so coupling has no influence.
+    # Joints under position commands follow them whatever the load: coupling has no influence.
     together = test != POSITIONS and are_coupled(mechanism, joints)
     groups = [list(joints)] if together else [[joint] for joint in joints]
     for group in groups:
@@ -203,7 +203,7 @@ def _add_group(
         tables[name] = _sensor(mechanism, joint, "position") | {"effects": []}
     if test != POSITIONS:
         for joint in joints:
-            # Position commands hold the joint whatever resists, so its friction cannot be seen.
+            # Position commands move the joint whatever the load, so its friction cannot be seen.
             tables[identifier(joint)] = {"joint": joint}
     if test == INVERSE:
         forces = [sensor_name(mechanism, joint, "force") for joint in joints]

@@ -198,7 +198,7 @@ class JoinedReplays:
             if joint in led:
                 self._mistakes.note(
                     where,
-                    f"free: an equality ties {joint} to {led[joint]}, so it goes with that; "
+                    f"free: an equality ties {joint} to {led[joint]}, so it follows {led[joint]}; "
                     f"leave {joint} out",
                 )
             else:

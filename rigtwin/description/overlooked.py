@@ -47,14 +47,14 @@ def overlooked(
 def _followed_ties(
     mechanism: Mechanism, components: Mapping[str, Component], replays: Sequence[ReplayOf]
 ) -> tuple[Tie, ...]:
-    """Return the equalities between joints that a replay with free joints obeys."""
+    """Return the joint equalities that replays with free joints satisfy."""
     free = [joint for replay in replays for joint in replay.free]
     if not free:
         return ()
     movers = [components[name] for replay in replays for name in replay.moved_by]
     prescribed = [mover.joint for mover in movers if mover.element != "actuator"]
     dependent = {tie.joint for tie in mechanism.ties_of([*free, *prescribed])[0]}
-    # An actuator on a dependent joint pushes the joint that leads it, and moves nothing by itself.
+    # An actuator on a dependent joint pushes the joint that is followed, and adds no moving joint.
     pushed = [mover.joint for mover in movers if mover.joint and mover.joint not in dependent]
     return mechanism.ties_of([*free, *prescribed, *pushed])[0]
 
@@ -76,13 +76,13 @@ def _joints(
     replays: Sequence[ReplayOf],
     tied: set[str],
 ) -> Iterator[str]:
-    """Yield the joints that stand still, and the stops of those that move."""
+    """Yield the joints that no replay moves, and the stops of joints with a range."""
     moved = _moving(components, replays)
     for number in range(model.njnt):
         name = _name(model, mujoco.mjtObj.mjOBJ_JOINT, number)
         for word, kind in ELEMENTS:
             if model.jnt_type[number] == kind:
-                yield f"joint {name}: it is a {word} joint, and stays where it is"
+                yield f"joint {name}: it is a {word} joint, so it stays where it is"
                 break
         else:
             if name not in moved | tied:
@@ -93,22 +93,22 @@ def _joints(
 
 
 def _dissipation(model: mujoco.MjModel, components: Mapping[str, Component]) -> Iterator[str]:
-    """Yield joints and tendons with dry friction that no component stands for.
+    """Yield joints with dry friction, and tendons, that no component describes.
 
-    MuJoCo treats dry friction as a constraint, so that inverse dynamics without constraints leave
-    it out. Components model it instead.
+    MuJoCo treats dry friction as a constraint, and the models' inverse dynamics leaves constraints
+    out. Components model the friction instead.
     """
-    # Sensors and actuators have channels; what is left are guides, rotors and masses.
+    # Sensors and actuators have channels; the remaining components are guides, rotors and masses.
     described = {(part.element, part.mjcf) for part in components.values() if part.channel is None}
     for number in range(model.njnt):
         name = _name(model, mujoco.mjtObj.mjOBJ_JOINT, number)
         friction = model.dof_frictionloss[model.jnt_dofadr[number]]
         if friction > 0.0 and ("joint", name) not in described:
-            yield f"joint {name}: its frictionloss, as it is no component"
+            yield f"joint {name}: its frictionloss; no component describes the joint"
     for number in range(model.ntendon):
         name = _name(model, mujoco.mjtObj.mjOBJ_TENDON, number)
         if ("tendon", name) not in described:
-            yield f"tendon {name}: it is no component"
+            yield f"tendon {name}: no component describes it"
 
 
 def _constraints(model: mujoco.MjModel, followed: set[int]) -> Iterator[str]:
@@ -126,15 +126,15 @@ def _constraints(model: mujoco.MjModel, followed: set[int]) -> Iterator[str]:
 
 
 def _actuators(model: mujoco.MjModel, components: Mapping[str, Component]) -> Iterator[str]:
-    """Yield actuators without a component that act without a command, and asymmetric limits."""
+    """Yield bias forces of actuators that no component describes, and asymmetric force limits."""
     described = {part.mjcf for part in components.values() if part.element == "actuator"}
     for number in range(model.nactuator):
         name = _name(model, mujoco.mjtObj.mjOBJ_ACTUATOR, number)
         bias = model.actuator_biasprm[number]
         pushes = model.actuator_biastype[number] != mujoco.mjtBias.mjBIAS_NONE and bias[:3].any()
         if name not in described and pushes:
-            yield f"actuator {name}: it is no component, so the force that it has without a command"
+            yield f"actuator {name}: its force without a command; no component describes it"
         low, high = model.actuator_forcerange[number]
-        # A force limit is one number here, the upper end for both directions.
+        # A component has one force limit for both directions: the upper end of the range.
         if model.actuator_forcelimited[number] and not np.isclose(low, -high):
-            yield f"actuator {name}: its forcerange's lower end {low:g}; taken as {-high:g}"
+            yield f"actuator {name}: lower end {low:g} of its forcerange; taken as {-high:g}"

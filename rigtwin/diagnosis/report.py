@@ -66,8 +66,8 @@ def bars(answer: Answer) -> list[Bar]:
     Returns
     -------
     list of Bar
-        All sensors first, then each component's replay. With a single replay, that one alone, as it
-        says the same. Empty where the data cannot be diagnosed.
+        All sensors first, then each component's replay. A single replay stands alone: the bar of
+        all sensors would be equal. Empty if the data cannot be diagnosed.
     """
     if answer.gap is None:
         return []
@@ -86,16 +86,17 @@ def bars(answer: Answer) -> list[Bar]:
 
 
 WORSE = 1.5
-"""Ratio of a recording's error to the sensor's median error from which the report warns of it."""
+"""The report warns of a recording whose error exceeds the sensor's median error by this factor."""
 TOLERABLE = 10.0
-"""Error, in percent of the signal, below which the report warns of no recording."""
+"""Error below which the report never warns, in percent of the signal's standard deviation."""
 NEGLIGIBLE = 0.02
-"""Share of a signal's standard deviation below which a twin predicts nothing of it."""
+"""Ratio of standard deviations, predicted to measured, below which a twin predicts almost
+nothing."""
 CONFIDENCE = "the probability that this effect is present, among all hypotheses that were tried"
 
 
 def headlines(overlays: Sequence[Overlay], corrected: bool) -> list[str]:
-    """Return how good the twin is before and after the correction, and where it is not good.
+    """Return sentences on the error before and after the correction, and on a poor recording.
 
     Parameters
     ----------
@@ -120,7 +121,7 @@ def headlines(overlays: Sequence[Overlay], corrected: bool) -> list[str]:
     if not corrected:
         return sentences
     held_out = [each for each in overlays if each.held_out]
-    # The error on the data of the fit is optimistic, so held-out recordings count alone.
+    # The error on fitted data is optimistic, so only held-out recordings count if there are any.
     counted = held_out or list(overlays)
     after = [each.after_percent for each in counted]
     before = [each.before_percent for each in counted]
@@ -197,7 +198,7 @@ def html(diagnosis: Diagnosis) -> str:
             headlines=headlines(overlays, corrected),
             tested=list(dict.fromkeys(each.recording for each in overlays if each.held_out)),
             confidence=CONFIDENCE,
-            weight="weight among those tried",
+            weight="weight among the hypotheses tried",
             spell=spell,
             sensor_units=_sensor_units(overlays),
             step_units=_step_units(answer),
@@ -218,7 +219,7 @@ def _environment() -> Environment:
     """Environment of the template; a misspelt variable raises rather than leaving a gap."""
     environment = Environment(
         loader=PackageLoader("rigtwin.diagnosis"),
-        # Names of files and channels come from outside and could otherwise write HTML.
+        # Names of files and channels come from outside and could otherwise inject HTML.
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
@@ -229,7 +230,7 @@ def _environment() -> Environment:
 
 
 def _step_units(answer: Answer) -> dict[str, tuple[float, str]]:
-    """Factor from SI and unit of each signal's residual, the same in all steps."""
+    """Factor from SI, and display unit, of each signal's residual; the same in all steps."""
     return {
         name: shorten(unit, *(step.residual[name] for step in answer.steps))
         for name, unit in answer.units.items()
@@ -237,7 +238,7 @@ def _step_units(answer: Answer) -> dict[str, tuple[float, str]]:
 
 
 def _sensor_units(overlays: Sequence[Overlay]) -> dict[str, tuple[float, str]]:
-    """Factor from SI and unit of each sensor's errors, the same in every row of a table."""
+    """Factor from SI, and display unit, of each sensor's errors; the same in all rows."""
     largest: dict[str, float] = {}
     for row in overlays:
         largest[row.sensor] = max(largest.get(row.sensor, 0.0), row.before, row.after)
@@ -257,7 +258,7 @@ def share_of(effect: Finding) -> str:
 def meaning_of(effect: Finding) -> str:
     """Return what an effect does, in words.
 
-    Some kinds mean something else for a negative value: a negative lag leads.
+    Some kinds have a different meaning for a negative value: a negative lag is a lead.
     """
     kind = next((each for each in KINDS if each.name == effect.name.kind), None)
     if kind is None:
@@ -288,7 +289,7 @@ def write(path: Path, diagnosis: Diagnosis) -> Path:
     Returns
     -------
     Path
-        The path.
+        Path of the written file.
 
     Raises
     ------

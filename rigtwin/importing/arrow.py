@@ -15,7 +15,7 @@ from rigtwin.numerics.arrays import Array
 SECONDS: Mapping[str, float] = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 """Arrow's unit of time → its length, s."""
 DAY = 86_400.0
-"""One day, s."""
+"""Duration of a day, s."""
 MOST_ITEMS = 1024
 """Longest lists whose items become columns. Longer lists are pictures or texts."""
 

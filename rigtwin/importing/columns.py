@@ -137,7 +137,7 @@ def numbers_of(cells: Sequence[str], decimal: str) -> tuple[Array, int | None]:
 
 
 def join(tables: Mapping[str, Columns]) -> Columns:
-    """Return the columns of several files side by side, row by row.
+    """Return the columns of several files, joined row by row.
 
     Parameters
     ----------

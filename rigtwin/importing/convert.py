@@ -1,4 +1,4 @@
-"""From files of another program to a recording, with a report of the conversion."""
+"""Convert files of another program to a recording, with a report of the conversion."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from rigtwin.recording import Writer
 BLOCK = 10_000
 """Ticks written at a time."""
 Data = Any
-"""Paths of files, a list; or data in memory."""
+"""List of paths, or data in memory."""
 ENDING = ".mcap"
 """Ending of a recording's name."""
 
@@ -55,7 +55,7 @@ def convert(
     Parameters
     ----------
     data
-        Files; several are put side by side, row by row. Or data in memory, see `read_frame`.
+        Files, whose columns are joined row by row; or data in memory, see `read_frame`.
     mapping
         Map from columns to channels: a TOML file, or its tables.
     out
@@ -71,9 +71,9 @@ def convert(
     Raises
     ------
     RigtwinError
-        Before anything is written. Also if the data hold several episodes.
+        If map or data are invalid, or the data hold several episodes. Nothing is written then.
     """
-    # The output is checked before anything is read, which may take minutes.
+    # The output is checked first, since reading may take minutes.
     recordable(forbid_overwriting(out, *_files(data, mapping)))
     wanted = load(mapping)
     described = _machine(wanted, machine)
@@ -96,8 +96,8 @@ def convert_episodes(
     Returns
     -------
     tuple of Written
-        In the order of the episodes. An episode that cannot be converted is left out, which every
-        report states.
+        Recordings in the order of the episodes. An episode that cannot be converted is left out;
+        every report says so.
 
     Raises
     ------
@@ -118,7 +118,7 @@ def convert_episodes(
     for episode in episodes:
         out = folder / f"{episode.name}{ENDING}"
         try:
-            # One damaged episode must not lose the others.
+            # One damaged episode must not prevent the conversion of the others.
             imported = make_channels(label, episode.columns, wanted, _units(wanted, described))
             line = _write(recordable(out), wanted, described, imported)
         except RigtwinError as error:
@@ -139,7 +139,7 @@ def read_columns(data: Data, selection: Selection = EVERYTHING) -> Columns:
     Parameters
     ----------
     data
-        Files, which are put side by side, row by row; or data in memory, see `read_frame`.
+        Files, whose columns are joined row by row; or data in memory, see `read_frame`.
     selection
         Columns and episodes that are needed. Defaults to all.
 
@@ -162,7 +162,7 @@ def read_channels(data: Data, wanted: Map, machine: Machine | None = None) -> Im
     Parameters
     ----------
     data
-        Files, which are put side by side, row by row; or data in memory, see `read_frame`.
+        Files, whose columns are joined row by row; or data in memory, see `read_frame`.
     wanted
         Map from columns to channels.
     machine
@@ -176,14 +176,15 @@ def read_channels(data: Data, wanted: Map, machine: Machine | None = None) -> Im
     Raises
     ------
     RigtwinError
-        Naming the column, unit or line that is at fault. Also if the data hold several episodes.
+        If a column, unit or line is wrong, which the message names, or the data hold several
+        episodes.
     """
     label, columns = _label(data), read_columns(data, wanted.selection)
     episodes = _split(label, columns, wanted)
     if len(episodes) > 1:
         raise RigtwinError(
             f"{label} holds {len(episodes)} episodes; name a folder as the output, such as "
-            "-o episodes/, which gets a recording of each, or choose one in the map: "
+            "-o episodes/, for a recording of each, or choose one in the map: "
             f"[episodes] take = [{episodes[0].number}]"
         )
     header = _header(label, columns)
@@ -210,7 +211,7 @@ def _are_paths(data: Data) -> TypeGuard[Sequence[Path]]:
 
 
 def _label(data: Data) -> str:
-    """Return what data are called in messages."""
+    """Return the name of the data in messages."""
     return ", ".join(map(str, data)) if _are_paths(data) else "the data"
 
 
@@ -220,7 +221,7 @@ def _split(label: str, columns: Columns, wanted: Map) -> list[Episode]:
     if not name:
         if wanted.episodes:
             raise RigtwinError(
-                f"{label}: [episodes] take needs [episodes] column, which numbers the episodes"
+                f"{label}: [episodes] with `take` needs `column` too, which numbers the episodes"
             )
         return []
     try:
@@ -270,7 +271,7 @@ def _write(out: Path, wanted: Map, machine: Machine | None, imported: Imported) 
             None if machine is None else catalogue.own_description(machine),
         ) as writer,
     ):
-        # Block by block: the messages of a long recording would otherwise be in memory at once.
+        # Written in blocks: otherwise all messages of a long recording would be in memory at once.
         for start in range(0, ticks, BLOCK):
             part = slice(start, min(start + BLOCK, ticks))
             blocks = {

@@ -75,7 +75,7 @@ def parse(text: str, name: str) -> Map:
     Raises
     ------
     RigtwinError
-        Naming the map, the key and what was expected.
+        If a key is wrong; the message names map and key, and what was expected.
     """
     try:
         document = parse_toml(text)

@@ -19,7 +19,7 @@ MOST_ITEMS = 256
 MEASURED = ("sensor_msgs/", "geometry_msgs/", "nav_msgs/")
 """Packages of messages that hold measurements; all others hold commands and states."""
 SECOND = 1_000_000_000
-"""One second, ns."""
+"""Duration of a second, ns."""
 TRAJECTORY = "trajectory_msgs/msg/JointTrajectory"
 
 

@@ -12,7 +12,7 @@ from dateutil import parser
 from rigtwin.numerics.arrays import Array
 
 DAY = 86_400.0
-"""One day, s."""
+"""Duration of a day, s."""
 _CLOCK = re.compile(r"(\d{1,2}):(\d{2})(?::(\d{2}(?:[.,]\d+)?))?\s*([ap]m)?", re.IGNORECASE)
 _ISO = re.compile(r"\d{4}-\d{2}-\d{2}([T ].*)?")
 _DATE = re.compile(r"\d{1,4}[./-](\d{1,2}|[A-Za-z]{3,9})[./-]\d{2,4}(\D.*)?")
@@ -33,8 +33,8 @@ def clock_of(cell: str) -> float | None:
 def stamps_of(cells: Sequence[str]) -> Array | None:
     """Return dates or times of day in s.
 
-    Times of day continue past midnight. A date without a zone is in universal time, so that no
-    daylight-saving change falls into the recording.
+    Times of day continue past midnight. A date without a time zone is read as UTC, so that
+    no daylight-saving change falls into the recording.
 
     Parameters
     ----------
@@ -57,8 +57,9 @@ def stamps_of(cells: Sequence[str]) -> Array | None:
 def _is_day_first(cells: Sequence[str]) -> bool:
     """Return whether 3/4 is the third of April rather than the fourth of March.
 
-    Dots and a first number above 12 mean that the day comes first; a second number above 12 and
-    a.m. or p.m. that the month does. Otherwise the shorter recording decides.
+    Dots, or a first number above 12, mean that the day comes first. A second number above 12, or
+    a.m. or p.m., means that the month comes first. Otherwise the number that varies more is the
+    day.
     """
     pairs = [match for cell in cells if (match := _LEADING.match(cell.strip()))]
     if not pairs:

@@ -24,10 +24,10 @@ REACHES = (0.3, 0.08)
 BAND = (0.15, 12.0)
 """Frequency band of the motions, Hz."""
 GENTLE_SHARE, GENTLE_HIGHEST = 0.15, 2.5
-"""rms of the motions of a test of any machine, as a share of half a joint's range, and their
-highest frequency, Hz: joints stay within their range, and drives within their force."""
+"""Gentle motions: rms as a share of half a joint's range, and highest frequency, Hz. With these,
+joints stay within their range and drives within their force."""
 SLOPE = 1.0
-"""Power of the frequency with which the amplitudes fall."""
+"""Exponent n of the amplitudes, which are proportional to frequency^−n."""
 Reach = tuple[float, float]
 """Middle and half width of a range, SI."""
 
@@ -35,22 +35,22 @@ Reach = tuple[float, float]
 def excite(
     machine: Machine, reach: Callable[[Machine, tuple[str, str]], Reach | None], least_period: float
 ) -> Iterator[Recording]:
-    """Yield recordings of multisines, without limits; none where a range is unknown.
+    """Yield recordings of multisines that no limit ends; none if a range is unknown.
 
     Parameters
     ----------
     machine
         Machine to simulate.
     reach
-        Range of what may be demanded of a channel.
+        Function that returns the range of a channel's demand, or None if it is unknown.
     least_period
-        Least time from tick to tick, s.
+        Shortest permitted period of the ticks, s.
     """
     timing = machine.configuration.timing._replace(duration=SECONDS)
     timing = timing._replace(period=max(timing.period, least_period))
     configuration = machine.configuration._replace(timing=timing)
     for number, share in enumerate(REACHES, 1):
-        # Fixed seeds: what the machine can show must not differ from call to call.
+        # Fixed seeds: every call must find the same effects observable.
         demands = demand_multisines(machine, reach, configuration, share, BAND[1], [number, 17])
         if demands is None:
             return
@@ -70,14 +70,14 @@ def demand_multisines(
     highest: float,
     seed: Sequence[int],
 ) -> dict[str, Array] | None:
-    """Return a multisine for each demanded channel; None where a range is unknown.
+    """Return a multisine for each demanded channel; None if a range is unknown.
 
     Parameters
     ----------
     machine
         Machine that is to move.
     reach
-        Range of what may be demanded of a channel.
+        Function that returns the range of a channel's demand, or None if it is unknown.
     configuration
         Settings, whose timing gives the ticks.
     share
@@ -111,17 +111,17 @@ def demand_multisines(
 
 
 def reach_of_component(machine: Machine, channel: tuple[str, str]) -> Reach | None:
-    """Return the range of the joint that the component of a channel acts on, or of its force."""
+    """Return the range of the demand of a component's channel: of its joint, or of its force."""
     moved = next((c for c in machine.components.values() if c.channel == channel), None)
     if moved is None:
-        # The description does not say how far a controller's other inputs go.
+        # The description states no range for the other inputs of a controller.
         return None
     joint = Mechanism(machine.model).joint(moved.joint or moved.acts_on[0][0])
     return _reach(machine, moved, joint)
 
 
 def reach_of_replay(machine: Machine, channel: tuple[str, str]) -> Reach | None:
-    """Return the range of the joint whose replay is moved by a channel, or of its force."""
+    """Return the range of the demand of a channel that moves a replay: of its joint, or force."""
     for replay in machine.replays:
         joint, mover = replay.joint, machine.components[replay.moved_by[0]]
         if channel == mover.channel:
@@ -140,15 +140,15 @@ def _reach(machine: Machine, mover: Component, joint: Joint) -> Reach:
 
 
 def _gentle_force(joint: Joint) -> float:
-    """Return half the weight, or what moves the joint to and fro once a second, N or Nm."""
+    """Return half the weight; without weight, the force of an oscillation of 1 Hz, N or Nm."""
     _, half = _range(joint)
-    # A joint without weight: force m·ω²·x for an oscillation of 1 Hz over half the range.
+    # Force of the oscillation: m·ω²·x with ω = 2π/s and x half the range.
     weight = 0.5 * max(np.abs(joint.gravity))
     return weight or joint.inertia * (2.0 * math.pi) ** 2 * half
 
 
 def _range(joint: Joint) -> tuple[float, float]:
-    """Return middle and half width of a joint's range, about its rest if that lies well inside."""
+    """Return middle and half width of a range about the joint's rest, clipped to its positions."""
     low, high = joint.positions[0], joint.positions[-1]
     middle = min(max(joint.rest, low), high)
     return middle, max(min(high - middle, middle - low), 0.25 * (high - low))

@@ -142,7 +142,7 @@ class IndependentJoints(Physics):
         )
 
     def reach(self, machine: Machine, channel: tuple[str, str]) -> tuple[float, float] | None:
-        """Return middle and half width of what may be demanded of a channel, None if unknown."""
+        """Return middle and half width of the range of a channel's demand; None if unknown."""
         from rigtwin.joints.excitation import reach_of_replay
 
         return reach_of_replay(machine, channel)

@@ -89,7 +89,7 @@ def _carry(
 
 @compilable
 def _shrink(speed: float, most: float) -> float:
-    """Return a speed after dry friction took `most` of it, and no more than all of it."""
+    """Return a speed reduced by dry friction by at most `most`, never beyond zero."""
     return math.copysign(max(abs(speed) - most, 0.0), speed)
 
 

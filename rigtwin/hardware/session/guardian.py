@@ -37,7 +37,7 @@ ABSENT = 1.0
 
 
 class Guardian:
-    """A `Recorder` of a session whose work is done by another process."""
+    """`Recorder` of a session that leaves the work to another process."""
 
     def __init__(self, settings: GuardianSettings) -> None:
         """Start the guardian.
@@ -62,7 +62,7 @@ class Guardian:
             # Ctrl-C reaches every process of a terminal; the guardian must outlive it.
             with block_sigint():
                 self._process.start()
-            # Only the guardian holds its end now, so that its death shows as an end of file.
+            # Without our copy of the guardian's end, its death shows as an end of file on ours.
             theirs.close()
             if not self._pipe.poll(STARTED):
                 raise RigtwinError("the guardian process does not start")
@@ -77,7 +77,7 @@ class Guardian:
     def beat(self, outputs: Sequence[float]) -> None:
         """Show that the loop is alive, note which outputs are safe, and check the guardian."""
         shared, now = self._shared, monotonic()
-        # The safe outputs are written before the time: a guardian that acts on the time finds them.
+        # The safe outputs are written before the time, so that they are valid once the time is new.
         shared[SAFE:], shared[BEAT] = outputs, now
         if now - shared[ALIVE] > ABSENT:
             self.fault = self.fault or "the guardian process does not answer any more"
@@ -97,8 +97,8 @@ class Guardian:
         """Do nothing: the guardian writes continuously."""
 
     def ready(self) -> None:
-        """Wait until the guardian could stop the rig. Raise RigtwinError if it cannot."""
-        # Attaching takes long, and is possible only after the loop has opened its tasks.
+        """Wait until the guardian is able to stop the rig. Raise RigtwinError if it is not."""
+        # The guardian attaches to the card's outputs. That is slow, and requires the loop's tasks.
         self._send("prepare")
         # The flag is polled: the guardian sets it in shared memory.
         end = monotonic() + STARTED
@@ -110,12 +110,12 @@ class Guardian:
     def transition(self, transition: Transition) -> None:
         """Record a transition; guard the loop from arming to rest."""
         if transition.after in self._settings.phases and self._shared[GUARDED] == 0.0:
-            # A fresh beat before guarding begins: the last one may be older than the patience.
+            # A fresh beat first: the last one may be older than the guardian tolerates.
             self._shared[BEAT] = monotonic()
             self._shared[GUARDED] = 1.0
         self._send("transition", transition)
-        # Guarding ends after the transition is sent: the guardian must know that the rig is at
-        # rest.
+        # The transition is sent first: the guardian must know that the rig is at rest before
+        # guarding ends.
         if transition.after not in self._settings.phases:
             self._shared[GUARDED] = 0.0
 
@@ -135,7 +135,7 @@ class Guardian:
         try:
             self._pipe.send(message)
         except (OSError, ValueError):
-            self.fault = self.fault or "the guardian process is gone, and the recording with it"
+            self.fault = self.fault or "the guardian process is gone; nothing is recorded any more"
 
     def _answer(self) -> object:
         """Return the guardian's next message; None after its end."""
@@ -149,7 +149,7 @@ class Guardian:
         while (said := self._answer()) is not None:
             self.fault = str(said)
         if self.fault is None and not self._finishing:
-            self.fault = "the guardian process is gone, and the recording with it"
+            self.fault = "the guardian process is gone; nothing is recorded any more"
 
     def _release(self) -> None:
         if self._process.is_alive():

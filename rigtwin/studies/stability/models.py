@@ -1,16 +1,17 @@
 """State-space models of the thesis (§5.1 to 5.3, §6.2) as python-control systems with named states.
 
-The input μ, in N, is the effect of the ground: k u + b u̇ of the suspension for a single mass,
-k_t u + b_t u̇ of the tyre for a quarter car.
+The input μ, in N, is the force that the motion u of the ground exerts: k u + b u̇ through the
+suspension of a single mass, k_t u + b_t u̇ through the tyre of a quarter car.
 
 The thesis has misprints that are corrected here:
 
-- (5.7) and (5.16) print −k and −b in the row of the mass, a spring that pushes away.
+- (5.7) and (5.16) print −k and −b for +k and +b in the row of the mass: a spring that would push
+  the mass away from its rest.
 - (5.16) prints +1/τ for −1/τ in the row of the lagged velocity.
-- (5.13) feeds μ past the force filter; (5.17) feeds it through, as this module does.
+- (5.13) adds μ after the force filter; (5.17) adds it before the filter, as this module does.
 - (5.37) prints b_s u for k_t u, and (5.38) k_t for k_s; the matrix (5.43) has both right.
-- (5.55) and (5.56) are missing; they are (5.53) and (5.54) as first-order rows, and the same with
-  the suspension's force through a filter.
+- (5.55) and (5.56) are missing. Here (5.55) is (5.53) and (5.54) as first-order rows, and (5.56)
+  adds a filter of the suspension's force to it.
 """
 
 from __future__ import annotations
@@ -130,8 +131,8 @@ def combined(car: QuarterCar, force_lag: float, structure_lag: float) -> StateSp
 def rig(car: QuarterCar, lags: Lags) -> StateSpace:
     """Return the model of the rig (Figure 6.14).
 
-    The plate follows the sprung mass, travel and its velocity are measured from the plate and
-    filtered, and the force follows its demand.
+    The plate follows the sprung mass with a lag. Travel and its velocity are measured at the plate
+    and filtered. The force follows its demand with a lag.
     """
     for lag in lags:
         check_time("lag", lag)
@@ -160,8 +161,8 @@ MODELS: Mapping[str, Callable[[QuarterCar, float], StateSpace]] = {
     "combined": lambda car, lag: combined(car, lag, lag),
     "rig": lambda car, lag: rig(car, Lags(lag, lag, lag, lag)),
 }
-"""Model → its system with one value, in s, for all lags. The names are those of
-`rigtwin.studies.stability.loop.LOOPS`."""
+"""Name of a model → function that returns it with the same value, in s, for all lags. The names
+are those of `rigtwin.studies.stability.loop.LOOPS`."""
 
 
 def poles(system: StateSpace) -> np.ndarray:
@@ -171,13 +172,13 @@ def poles(system: StateSpace) -> np.ndarray:
 
 def rightmost(system: StateSpace) -> complex:
     """Return the pole with the largest real part, in 1/s; of a pair, the one with Im > 0."""
-    # Rounding, so that of a pair with equal real parts the imaginary part decides.
+    # Rounding makes the real parts of a pair equal, so that the imaginary part decides.
     return complex(max(poles(system).tolist(), key=lambda pole: (round(pole.real, 9), pole.imag)))
 
 
 def sort_poles(poles: np.ndarray) -> np.ndarray:
     """Return poles sorted by real part; of a pair, the one with positive frequency first."""
-    # Rounding keeps a pair together, whose real parts differ in their last bits.
+    # The real parts of a pair differ in their last bits; rounding keeps the pair together.
     return poles[np.lexsort((-poles.imag, np.round(poles.real, 9)))]
 
 
@@ -228,7 +229,7 @@ def _quarter_car(
 def _system(rows: Rows, *outputs: str) -> StateSpace:
     """Assemble a state-space system from its rows, with the states' names."""
     states = list(rows)
-    # A state that a row does not name has the coefficient 0.
+    # The coefficient of a state that a row does not name is 0.
     dynamics = np.array([[row.get(state, 0.0) for state in states] for row in rows.values()])
     ground = np.array([[row.get(GROUND, 0.0)] for row in rows.values()])
     read = np.array([[float(state == output) for state in states] for output in outputs])

@@ -74,7 +74,7 @@ class FormulaFigure:
         # A formula without inputs still needs a signal of the test's length.
         values = formula(self.text, {}).replayed({}, inputs or [time], trial.period)
         figure = STATISTICS[self.statistic](values[trial.first :])
-        # Overflows count as trips do: the candidate has no score.
+        # An overflow counts like a trip: the candidate gets no score.
         return figure if math.isfinite(figure) else math.nan
 
 
@@ -85,9 +85,9 @@ LONGEST = 100
 def list_channels(machine: Machine) -> dict[str, Channel]:
     """Return the channels that formulas can use, by name.
 
-    Names are those of components with a channel, of channels' fields, and `time`.
+    A name is that of a component with a channel, the field of a channel, or `time`.
     """
-    # Later entries win: a component's name before a sensor's field, that before a demand's.
+    # Of equal names the later entry wins: component, then sensor's field, then demand's field.
     channels = [c.channel for c in machine.components.values() if c.channel is not None]
     control = () if machine.control is None else machine.control.channels
     by_field = {channel[1]: channel for channel in (*control, *demanded_channels(machine))}
@@ -128,7 +128,7 @@ def parse_measure(name: str, table: object, channels: Mapping[str, Channel]) -> 
     # matplotlib would typeset text between two $ as a formula.
     if len(words["title"]) > LONGEST or "$" in words["title"]:
         raise RigtwinError(
-            f"{where}.title = {words['title']!r:.60}: expected at most {LONGEST} letters, none a $"
+            f"{where}.title = {words['title']!r:.60}: expected at most {LONGEST} characters, no $"
         )
     if not isinstance(statistic, str) or statistic not in STATISTICS:
         raise RigtwinError(f"{where}.of = {statistic!r:.40}: expected {', '.join(STATISTICS)}")
@@ -143,7 +143,7 @@ def parse_measure(name: str, table: object, channels: Mapping[str, Channel]) -> 
             expected = ", ".join(channels)
             raise RigtwinError(f"{where}.formula: unknown {channel!r}; expected {expected}")
     if not inputs:
-        raise RigtwinError(f"{where}.formula = {text!r:.60}: expected a channel in it")
+        raise RigtwinError(f"{where}.formula = {text!r:.60}: expected at least one channel")
     figure = FormulaFigure(
         str(text), str(statistic), tuple(channels[channel] for channel in inputs)
     )
