@@ -92,6 +92,8 @@ def _posterior(diagnosis: Diagnosis) -> Posterior:
         if effect.name.kind not in ("setting", "unknown")
         for name, estimate in effect.parameters.items()
     }
+    # The corrected twin needs all its corrections at once, so it is as certain as the least certain
+    # one.
     confidence = min(effect.confidence for effect in diagnosis.effects)
     return Posterior(
         {},

@@ -74,6 +74,8 @@ def find_changes(
         )
         model = search.compare()
         has_change = any(parameter.verdict == "changed" for parameter in model.parameters)
+        # A restart costs two more diagnoses, so it is made only where there is something to
+        # explain.
         if has_change or search.together.verdict not in ("no gap", "explained"):
             model = _restart(model, search, (aligned[0], aligned[-1]), diagnose_set, thresholds)
     covariates = _covariates(search.evidence)
@@ -109,6 +111,8 @@ def _align_zeros(
     aligned = list(recordings)
     search = ChangeSearch(diagnose_set(aligned), thresholds)
     progress("comparing recordings", 1)
+    # A sensor may be zeroed anew between two tests. One plant for all recordings has one zero, so
+    # the difference would bias every effect that the joint diagnosis fits.
     differing = search.differing_zeros()
     if differing:
         aligned = [
@@ -205,6 +209,7 @@ def _with_trends(
     half_widths = np.array([0.5 * (interval.high - interval.low) for interval in parameter.values])
     # The fit weighs by standard errors, `interval_half_width` to each side.
     trends = fit_trends(
+        # The standard errors come from a jackknife, with one degree of freedom less than blocks.
         values, half_widths / thresholds.interval_half_width, covariates, float(BLOCKS - 1)
     )
     rivals, named = name_trends(

@@ -101,6 +101,8 @@ def _still_signals(evidence: Evidence) -> list[str]:
     still = [
         row.name
         for n, row in enumerate(evidence.machine.rows)
+        # A signal that should move and does not is a finding. Only one that is still in both is
+        # none.
         if max(np.std(lines.measured[n]), np.std(predicted[n])) < STILL * float(lines.noise[n])
         or np.ptp(evidence.recordings[0].column(*row.channel)) < NOTHING
     ]
@@ -151,6 +153,7 @@ def differences(first: Recording, second: Recording) -> tuple[str, ...]:
     notes = []
     if digest(first) == digest(second):
         notes.append("both hold the same data, so no difference says anything")
+    # Notes do not stop the comparison: two unlike tests may be compared on purpose.
     if first.experiment != second.experiment:
         notes.append(f"different experiments: {first.experiment} and {second.experiment}")
     settings = {*first.controller, *second.controller}
@@ -226,6 +229,8 @@ def compare_recordings(
                 raise RigtwinError(
                     f"{topic}.{name} is not a number somewhere in {first.path} or {second.path}"
                 )
+            # The mains has another phase in every recording, so its line is in the difference even
+            # where the machine is the same.
             difference = remove_mains(before - after, first.period, machine.plant.mains.frequency)
             if np.ptp(before) == 0.0 and np.ptp(after) == 0.0:
                 still.append(sensor.name)

@@ -71,14 +71,19 @@ def find_confounded(
     jacobian = np.column_stack(responses)
     confounded = []
     for effect in scaling:
+        # A tolerance of the declared value would absorb the very response that is studied; naming
+        # the effect fixes that tolerance.
         space = Space(searched, fit.plant, effects=(*fit.effects, effect))
         value = _declared(effect, searched)
         changed = with_values(fit.plant, (effect,), ((value * (1.0 + STEP),),))
         response = (searched.residual(changed) - base) / STEP
         projected = space.project_out(np.column_stack([jacobian, response]))
         columns, target = projected[:, :-1], projected[:, -1]
+        # The response is per unit of relative change, and its χ² grows with the square of that
+        # change.
         if float(target @ target) * CHANGE**2 < VISIBLE:
             continue
+        # The least-squares solution e of target + columns e = 0, the module's equation.
         exponents = -np.linalg.lstsq(columns, target, rcond=None)[0]
         if not _undoes(columns, exponents, target) or np.abs(exponents).max() > STEEPEST:
             continue

@@ -76,6 +76,8 @@ def power(evidence: Evidence, plant: Plant) -> list[Array]:
     """
     powers = []
     for lines, predicted in zip(evidence.lines, evidence.predict(plant), strict=True):
+        # A plant that diverges predicts values whose squares overflow. Infinite power is the right
+        # answer.
         with np.errstate(over="ignore"):
             relative = (lines.measured - predicted) / lines.noise[:, None]
             powers.append(np.mean(relative**2, axis=0))
@@ -166,6 +168,7 @@ def largest_shrinkage(
         for number, predicted in enumerate(predictions):
             relative = (lines.measured - predicted)[:, counted] / lines.noise[:, None]
             powers[number] += np.sum(relative**2, axis=1)
+    # On the data of the fit the corrected residual is too small; see `_validate_on_blocks`.
     powers[1] *= optimism
     return max(
         (
@@ -205,6 +208,8 @@ def blocks(evidence: Evidence, before: Plant, after: Plant) -> Blocks:
         # A short recording still gives several blocks to draw from.
         length = min(length, max(recording.ticks // 4, 1))
         counted = lines.fade.max(axis=0) > 0.5
+        # The incomplete block at the end is dropped: means of fewer ticks scatter more than the
+        # others.
         for start in range(0, len(nominal) - length + 1, length):
             if counted[start : start + length].all():
                 nominal_means.append(float(np.mean(nominal[start : start + length])))
@@ -251,8 +256,12 @@ def interval(residual: Blocks) -> Interval:
     # The seed is fixed: the same recordings give the same answer.
     random = np.random.default_rng(SEED)
     drawn = random.integers(0, count, (DRAWS, count))
+    # Both residuals are drawn by the same blocks. What raises both, such as a fast part of the
+    # motion, then cancels in their ratio.
     before, after = residual.before[drawn].mean(axis=1), residual.after[drawn].mean(axis=1)
     values = [shrinkage(b, a, residual.floor) for b, a in zip(before, after, strict=True)]
+    # The percentiles of the draws serve as interval (Efron), since a ratio of square roots is
+    # skewed and may be far from normal.
     low, high = np.quantile(values, [0.025, 0.975])
     return Interval(_shrinkage_of(residual), float(low), float(high))
 
@@ -341,6 +350,7 @@ def _validate_on_blocks(
     """
     best = posterior.best
     outside, fitted = (float(np.sum(part * best.samples)) for part in (best.levels, best.inside))
+    # A ratio below 1, blocks predicted better than they were fitted, is luck and no merit.
     optimism = max(outside / max(fitted, 1e-300), 1.0)
     scaled = Blocks(inside.before, inside.after * optimism, inside.floor)
     return Validation(

@@ -108,6 +108,8 @@ def find_faults(
         Faults, the gravest first. Later checks are skipped where earlier faults make them
         meaningless.
     """
+    # Every check relies on the earlier ones: a missing channel cannot be read, a single NaN spoils
+    # all statistics, and a model driven by a dead command predicts nothing to compare with.
     faults = [*_check_presence(machine, recording, least)]
     if not faults:
         faults += _check_values(machine, recording)
@@ -191,6 +193,7 @@ def _check_presence(machine: Machine, recording: Recording, least: int) -> Itera
 
 def _check_values(machine: Machine, recording: Recording) -> Iterator[Fault]:
     steps = np.diff(recording.time)
+    # Half a period tells the jitter of a clock from a lost tick.
     gaps = np.nonzero(np.abs(steps - recording.period) > 0.5 * recording.period)[0]
     if len(gaps):
         first = gaps[0]
@@ -209,6 +212,8 @@ def _check_values(machine: Machine, recording: Recording) -> Iterator[Fault]:
                 f"{where} is not a number at {recording.time[np.argmax(wrong)]:.3f} s",
             )
             continue
+        # Quantiles, because the damaged samples would inflate a standard deviation until they look
+        # usual.
         spread = float(np.subtract(*np.quantile(signal, [0.999, 0.001])))
         away = np.abs(signal - float(np.median(signal)))
         at = int(np.argmax(away))
@@ -246,6 +251,8 @@ def _check_alive(machine: Machine, recording: Recording, predicted: Array) -> It
         if component.element != "sensor":
             continue
         bit = getattr(getattr(machine.plant, name), "resolution", 0.0)
+        # A sensor that resolves its declared bit shows noise all the time. A coarser one may
+        # rightly repeat a value, for example while the machine rests.
         if bit > 0.0 and length >= STUCK and smallest_step(signal) <= COARSE * bit:
             since = f"for {length * recording.period:.3g} s from {recording.time[first]:.3f} s"
             yield Fault(
@@ -289,6 +296,7 @@ def _check_inputs(
 
 def _check_order(machine: Machine, recording: Recording, predicted: Array) -> Iterator[Fault]:
     """Yield exchanged channels: another order of the sensors of one unit fits far better."""
+    # Sensors of different units cannot be exchanged unnoticed: their scales would be wrong.
     for unit in dict.fromkeys(row.unit for row in machine.rows if row.kind != "command"):
         rows = [
             (n, row)
@@ -315,6 +323,8 @@ def _check_order(machine: Machine, recording: Recording, predicted: Array) -> It
         least = min(total(order) for order in orders)
         swings = [np.std(recording.column(*row.channel)) for _, row in rows]
         size = float(np.linalg.norm(swings))
+        # A defect may make a wrong order fit slightly better. An exchange must fit three times as
+        # well, and explain most of the motion.
         if least < min(total(tuple(names)) / 3, EXCHANGED * size):
             # Orders that fit about as well differ in what these data cannot tell; the fewest swaps
             # are the likeliest.
@@ -343,6 +353,8 @@ def _check_scale(machine: Machine, recording: Recording, predicted: Array) -> It
         if rms(b) == 0.0 or rms(a) < MOVES * white_noise(signal) or not np.isfinite(b).all():
             continue
         alike, slope = float(a @ b) / float(np.sqrt((a @ a) * (b @ b))), float(a @ b / (b @ b))
+        # `alike` is the correlation of signal and prediction, and `slope` the regression of the
+        # signal on the prediction: its scale.
         if alike < -CORRELATED:
             yield Fault(
                 "sign", where, f"{where} has the wrong sign: it goes against what is predicted"
@@ -355,6 +367,8 @@ def _check_scale(machine: Machine, recording: Recording, predicted: Array) -> It
                 odd[row] = slope
     for row, slope in _unexplained_scales(machine, recording, odd).items():
         known = UNITS.get(row.unit, ((1.0, ""),))
+        # Scales are compared by their logarithms: twice too large and twice too small are equally
+        # wrong.
         factor, guess = min(known, key=lambda pair: abs(np.log(pair[0] / slope)))
         as_if = f", as if in {guess}" if abs(np.log(factor / slope)) < NEAR_UNIT and guess else ""
         where = ".".join(row.channel)

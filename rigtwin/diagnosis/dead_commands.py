@@ -68,6 +68,8 @@ def _computed_commands(
     if control is None or OWN in recording.controller:
         return {}
     inputs = [recording.column(*channel) for channel in control.channels]
+    # A dead input may drive an integrator of the controller beyond all limits. Such commands are
+    # dropped below.
     with np.errstate(all="ignore"):
         commands = control.replay(configuration.controller, inputs, recording.period)
     return {

@@ -225,6 +225,8 @@ def diagnose(
         same data as fitted ones.
     """
     started = time.perf_counter()
+    # Copies go before short recordings: with one of two left, the stricter limits of a single
+    # recording apply.
     recordings, notes = drop_copies(recordings)
     refuse_copies(held_out, recordings)
     recordings, short = drop_short(recordings)
@@ -233,6 +235,8 @@ def diagnose(
     # BLAS threads would compete with the threads of the search.
     with threadpool_limits(1):
         configurations = [machine.configuration_of(recording, base) for recording in recordings]
+        # The standstill is asked for first: the data checks would call a sensor dead that rightly
+        # saw no motion.
         unusable = _answer_standstill(machine, recordings, started) or _answer_unusable(
             machine, recordings, configurations, started
         )
@@ -294,6 +298,8 @@ def _diagnose_part(
     named, plant = judged.named, judged.plant
     progress("locating the residual", 1)
     disturbances = locate_disturbance(evidence, plant, named) if judged.has_residual else ()
+    # Noise and hum are read off the residual of the corrected twin, which the named effects no
+    # longer disturb.
     readings = _read_signals(evidence, plant, thresholds)
     attributed = describe_attributed(explanation, named, judged.support, evidence, thresholds)
     effects = [*attributed, *_describe_readings(readings, evidence, thresholds)]
@@ -367,6 +373,7 @@ def _has_residual(explanation: Explanation, named: Sequence[Effect]) -> bool:
     posterior = explanation.posterior
     if set(named) == set(posterior.best.fit.effects):
         return posterior.has_unexplained_residual
+    # The named effects may be another scored hypothesis than the best one.
     identical = [
         hypothesis.scored
         for hypothesis in posterior.ranking
@@ -460,6 +467,7 @@ def _clipping_notes(evidence: Evidence) -> list[str]:
         for recording, configuration in zip(
             evidence.recordings, evidence.configurations, strict=True
         )
+        # The length was judged before, by the rules for the whole set.
         for fault in find_faults(evidence.machine, recording, configuration, SHORTEST_PART)
         if not fault.fatal
     ]
@@ -502,6 +510,8 @@ def _places(
         places[effect.name] = replace(place, evidence=f"{effect.kind.title}, {place.evidence}")
     if disturbances:
         foremost = disturbances[0]
+        # The shares of the findings add up to the explained part of the gap's power
+        # (`findings._shares`).
         share = max(1.0 - sum(finding.share for finding in attributed), 0.0)
         correlation = describe_correlation(foremost.forms)
         residual = evidence.differences(judged.plant)

@@ -148,6 +148,8 @@ def weigh_lines(
         The recording in the frequency domain.
     """
     whole = np.stack([recording.column(*row.channel) for row in machine.rows])
+    # The band is limited before ticks are left out, or what lies above the new Nyquist frequency
+    # would alias into it. The copy is needed, as the mains line is subtracted from it in place.
     measured = limit_band(whole, model.band, recording.period)[:, :: model.every].copy()
     ticks = measured.shape[1]
     period = model.every * recording.period
@@ -155,9 +157,15 @@ def weigh_lines(
     # The FFT is fastest at lengths with small prime factors; zeros are appended.
     length = int(next_fast_len(ticks, real=True) or ticks)
     frequency = rfftfreq(length, period)
+    # 0.5 / period is the Nyquist frequency. The lines just below it contain what sampling folds
+    # back.
     used = frequency <= min(HIGHEST_FREQUENCY, 0.4 / period, model.band)
+    # A recording of duration T resolves frequencies to 1 / T, so in a short one the mains line is
+    # as broad as that.
     width = max(MAINS_WIDTH, 2.0 / (ticks * period))
     off_mains = np.abs(frequency[used] - plant.mains.frequency) > width
+    # The estimate takes third differences, which a limited band would make too small: hence
+    # `whole`.
     noise = np.array([white_noise(row) for row in whole])
     resolution = np.array([smallest_step(row) for row in whole])
     # Rounding to a bit q is uniform noise of the rms q / sqrt(12).
@@ -267,6 +275,8 @@ def _model_with_enough_steps(
         for row in machine.rows
     ]
     predicted = model.predict(configuration.plant)
+    # For an integrator of order p the change is (1 - 2^-p) of the coarser model's error, so at
+    # least half of it (Richardson).
     while steps < most:
         finer = model.double_steps()
         refined = finer.predict(configuration.plant)
@@ -294,6 +304,8 @@ def _smooth(power: Array, lines: int = SMOOTHING_LINES) -> Array:
 
     A spectrum too short for that is averaged over fewer lines.
     """
+    # A kernel longer than the spectrum would make `same` return the kernel's length. `same` pads
+    # with zeros, which lowers the average at both ends by half at most.
     lines = min(lines, (len(power) - 1) // 2)
     return np.convolve(power, np.ones(2 * lines + 1) / (2 * lines + 1), mode="same")
 
@@ -303,6 +315,8 @@ def _fade(ticks: int, period: float) -> Array:
 
     The rise is half a period of a cosine, so that the window adds no high frequencies.
     """
+    # A fixed fade would cost a short recording most of its data, so it takes at most 15 % of the
+    # duration.
     time, end = np.arange(ticks) * period, min(FULL_WEIGHT_TIME, 0.15 * ticks * period)
     rise = (time / end - IGNORED_SHARE) / (1.0 - IGNORED_SHARE)
     return 0.5 - 0.5 * np.cos(np.pi * np.clip(rise, 0.0, 1.0))
@@ -467,17 +481,20 @@ class Evidence:
                     for row, fade, height in zip(propagated, lines.fade, heights, strict=True)
                 ]
             )
+            # weight² is 1 / v, so the excess becomes relative to the variance of the line.
             excesses.append(np.maximum(spread - lines.spread, 0.0) * lines.weight**2)
         return excesses
 
     def halve_steps(self) -> Evidence:
         """Return the same evidence with half the integration steps, for use in a search only."""
+        # The shallow copy shares lines and weights, so that misfits of both have the same meaning.
         coarse = copy(self)
         coarse.models = [model.halve_steps() for model in self.models]
         return coarse
 
     def thin(self) -> Evidence:
         """Return the same evidence with fewer ticks where the models allow it, for a search."""
+        # Other ticks have other spectra, so unlike in `halve_steps` the lines are computed anew.
         thinned = copy(self)
         thinned.models = [model.thin(SEARCH_PERIOD) for model in self.models]
         if all(model is whole for model, whole in zip(thinned.models, self.models, strict=True)):
@@ -581,6 +598,7 @@ class Evidence:
     def transforms(self, differences: Sequence[Array]) -> Iterator[NDArray[np.complex128]]:
         """Yield the weighted spectra of differences, shape (rows, lines) for each recording."""
         for lines, difference in zip(self.lines, differences, strict=True):
+            # The compared lines are the lowest ones, so they are the beginning of the spectrum.
             yield (
                 rfft(lines.fade * difference, lines.length, axis=1)[:, : len(lines.frequency)]
                 * lines.weight
@@ -602,6 +620,7 @@ class Evidence:
         """
         parts = [model.missing_force(plant) for model in self.models]
         known = [part[UNKNOWN_ENDS:-UNKNOWN_ENDS] for part in parts if part is not None]
+        # All recordings or none, so that the vectors of all plants have one length.
         return np.concatenate(known) if len(known) == len(parts) else None
 
     def residual(self, plant: Plant) -> Array:
@@ -652,6 +671,7 @@ class Evidence:
         before = self.predict(plant)
         columns = []
         for tolerance in self.machine.tolerances:
+            # A sensor's tolerance acts linearly, for which one side suffices.
             width = self.width(tolerance)
             after, scale = self.predict(tolerance.shift(plant, width)), 1.0
             start = before
@@ -685,6 +705,8 @@ def relative_errors(evidence: Evidence, plant: Plant) -> Array:
     """
     errors = []
     for lines, predicted in zip(evidence.lines, evidence.predict(plant), strict=True):
+        # The state of the twin is unknown at the start of a recording, where no signal has weight
+        # yet.
         counts = lines.fade.max(axis=0) > 0.5
         scale = np.maximum(np.std(lines.measured, axis=1), lines.noise)
         relative = (lines.measured - predicted)[:, counts] / scale[:, None]

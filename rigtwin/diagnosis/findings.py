@@ -91,6 +91,8 @@ def choose_named(
         _standard_errors(explanation, support, thresholds),
         strict=True,
     ):
+        # Standard errors with all their parts are used, also those of residual and hypotheses, as
+        # the answer shows them.
         steadiness = effect.steadiness(values, widths, posterior.nominal)
         if steadiness <= thresholds.interval_half_width:
             # The interval holds the nominal value, so the data do not ask for a change.
@@ -98,6 +100,7 @@ def choose_named(
         shares = [
             posterior.inclusion(candidate) for candidate in (effect, *posterior.rivals(effect))
         ]
+        # A hypothesis with two of the rivals counts twice in the sum, which may therefore exceed 1.
         probability = min(sum(shares), 1.0) * (1.0 - support[effect].mimic)
         # Effective number of rivals (inverse participation ratio): n for n equal shares.
         members = sum(shares) ** 2 / sum(share**2 for share in shares)
@@ -174,6 +177,8 @@ def _describe_rival(
     rest = set(explanation.fit.effects) - {effect}
     for hypothesis in explanation.posterior.ranking:
         scored = hypothesis.scored
+        # The ranking is sorted by cost, so the first hypothesis that fits the description is the
+        # best one.
         if rival in scored.fit.effects and rest <= set(scored.fit.effects):
             beside = []
             for member in scored.fit.effects:
@@ -232,6 +237,8 @@ def _standard_errors(
         bias = share * distance
         widest = WIDEST * distance / thresholds.interval_half_width
         count = effect.kind.magnitudes
+        # The limit applies to the bias alone: a formal error beyond it stays as it is. A residual
+        # says little about shapes, so only magnitudes are widened.
         widened = [min(math.hypot(width, bias), max(width, widest)) for width in formal[:count]]
         errors.append((*widened, *formal[count:]))
     return errors
@@ -257,6 +264,7 @@ def _shares(
 
     The parts are proportional to the misfit that returns when each effect alone is left out.
     """
+    # `closes` is a share of the gap's amplitude, and findings have shares of its power.
     explained = min(max(1.0 - (1.0 - posterior.closes(posterior.best)) ** 2, 0.0), 1.0)
     if len(named) <= 1:
         return dict.fromkeys(named, explained)
@@ -388,6 +396,8 @@ def estimates(
     nominal = effect.nominal(evidence.plant)
     # The instant of sampling within a tick is a tolerance, so no delay is known better than that.
     timing = max((evidence.width(t) for t in evidence.machine.tolerances if t.ticks), default=0.0)
+    # Divided here because the interval is `wider` times as wide: half of it is then at least the
+    # tolerance.
     least = {"delay": timing / wider}
     return {
         name: Estimate(

@@ -110,6 +110,8 @@ def is_possible(effects: Sequence[Effect], plant: Plant) -> bool:
     bool
         False if a play, a spring or a Stribeck peak of a guide has no dry friction in series.
     """
+    # Either a fitted friction or that of the plant will do: the kinds of `THROUGH_FRICTION` act in
+    # series with it.
     dry = {effect.group for effect in effects if effect.kind.name == "coulomb"}
     return all(
         effect.of is not Guide

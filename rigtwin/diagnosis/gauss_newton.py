@@ -98,6 +98,8 @@ def minimise(
     widening, shortening = 1.0, np.ones(len(values))
     for _ in range(ITERATIONS):
         factors = widening * shortening
+        # Divided by the factors, the columns stay in units of the original steps, and so does the
+        # move.
         jacobian = take_derivatives(residual, values, current, factors * steps, high) / factors
         # The responses just taken shorten the steps of the next iteration.
         shortening = shorten(jacobian, misfit)
@@ -111,6 +113,8 @@ def minimise(
             for share in MOVE_SHARES:
                 moved = np.clip(values + share * move * steps, low, high)
                 tried = residual(moved)
+                # The first share that lowers the misfit is taken. An exact line search would cost
+                # more predictions than the next iteration.
                 if (value := space.misfit(tried)) < misfit:
                     gained = misfit - value
                     values, current, misfit = moved, tried, value
@@ -190,6 +194,8 @@ def take_derivatives(
     """
     columns = []
     for number, step in enumerate(steps):
+        # One-sided differences cost one prediction per parameter and central ones two. Their error
+        # slows the iteration; the misfit is exact in any case.
         sign = 1.0 if values[number] + step <= high[number] else -1.0
         shifted = values.copy()
         shifted[number] += sign * step

@@ -99,6 +99,8 @@ def _describe_shared_delay(effects: Sequence[Finding]) -> Iterator[str]:
         for effect in effects
         if effect.name.kind == "delay"
     }
+    # Intervals of which every two overlap have a common point (Helly), between the largest low end
+    # and the smallest high end.
     low = max((delay.low for delay in delays.values()), default=0.0)
     high = min((delay.high for delay in delays.values()), default=0.0)
     if len(delays) > 1 and low <= high:
@@ -119,6 +121,7 @@ def _join_steps(answers: Sequence[Answer]) -> tuple[Step, ...]:
     chains = [answer.steps for answer in answers if answer.steps]
     if not chains:
         return ()
+    # Every chain begins with the nominal plant, and each signal belongs to one part.
     residual = {name: value for chain in chains for name, value in chain[0].residual.items()}
     joined = [replace(chains[0][0], residual=residual)]
     for chain in chains:

@@ -137,6 +137,7 @@ class EffectFit:
             A line for each value that MJCF has no attribute for.
         """
         changes = [
+            # A name is `kind@component`, followed by the parameter where the kind has several.
             Change(p.name.partition("@")[2].partition(" ")[0], _parameter(p.name), p.value)
             for p in self.parameters
         ]
@@ -280,6 +281,7 @@ def _list_starts(
     ]
     if len(alone) > 1:
         starts.append(_start_in_turn(fitter, effects, alone, values))
+    # `fit_one` has refined a single effect from all its starts already.
     return starts if len(effects) > 1 else starts[:1]
 
 
@@ -292,6 +294,7 @@ def _is_settled(fitter: Fitter, optima: Sequence[Fit]) -> bool:
     first, expected = optima[0], fitter.evidence.expected
     if any(effect.kind.name not in LINEAR for effect in first.effects):
         return False
+    # No other optimum can be better by more than noise.
     if first.misfit < SUFFICIENT_MISFIT * expected:
         return True
     excess = max(first.misfit / expected, 1.0)
@@ -326,6 +329,8 @@ def _start_in_turn(
     values: list[tuple[float, ...]],
 ) -> list[tuple[float, ...]]:
     """Return the fit that adds one effect after another, the one that explains most first."""
+    # Small starts of the later effects leave most of the data to the effect that explained most by
+    # itself.
     order = sorted(alone, key=lambda effect: alone[effect].misfit)
     fit = alone[order[0]]
     for effect in order[1:]:
@@ -367,10 +372,12 @@ def _invert(normal: Array, steps: Array, ranges: Array) -> Array:
     A direction that the data say nothing about gets the variance of the whole range instead of
     none, as a pseudo-inverse would give it.
     """
+    # The information per squared step that corresponds to a standard deviation of the whole range.
     least = (steps / ranges) ** 2
     scale = np.sqrt(np.maximum(np.diag(normal), least))
     eigenvalues, vectors = np.linalg.eigh(normal / np.outer(scale, scale))
     inverse = (vectors / np.maximum(eigenvalues, SINGULAR)) @ vectors.T
+    # The deviations are limited to the ranges, and the correlations of the inverse stay.
     widest = np.minimum(np.sqrt(np.diag(inverse)) * steps / scale, ranges)
     sizes = np.sqrt(np.diag(inverse))
     return inverse / np.outer(sizes, sizes) * np.outer(widest, widest)
@@ -383,6 +390,8 @@ def _list_parameters(machine: Machine, fit: Fit, covariance: Array) -> tuple[Fit
         nominal = effect.nominal(machine.plant)
         quantities = effect.quantities()
         for name, value in zip(effect.kind.parameters, values, strict=True):
+            # The length of the list is the index of the next value in the flat order of the
+            # covariance.
             half = WIDTH * float(deviations[len(parameters)])
             quantity = quantities[name]
             parameters.append(
@@ -415,6 +424,8 @@ def _find_doubts(
         if p.low <= p.nominal <= p.high
     ]
     deviations = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+    # An eigenvector of a small eigenvalue of the correlation matrix is a combination that the data
+    # determine, although they determine none of its members.
     eigenvalues, vectors = np.linalg.eigh(covariance / np.outer(deviations, deviations))
     for eigenvalue, vector in zip(eigenvalues, vectors.T, strict=True):
         members = [

@@ -179,6 +179,7 @@ def _compare_size(view: View) -> str:
 def _stretch(view: View, weight: Array, seconds: float) -> slice:
     """Ticks of the stretch of that length with the largest sum of a weight, shape (ticks,)."""
     ticks = min(max(round(seconds / view.period), 2), len(view.time))
+    # Differences of the cumulative sum are the sums over all windows of that length.
     sums = np.concatenate([[0.0], np.cumsum(weight)])
     start = int(np.argmax(sums[ticks:] - sums[:-ticks]))
     return slice(start, start + ticks)
@@ -229,11 +230,14 @@ def _against(
     counted = view.counted
     along, residual = along[counted], (view.measured - view.before)[counted]
     law = (view.after - view.before)[counted]
+    # Quantiles keep a few fast ticks from squeezing all others into the middle of the axis.
     low, high = np.quantile(along, [EXTREME, 1.0 - EXTREME])
     edges = np.linspace(low, high, BINS + 1)
+    # -1 and `BINS` are the places of values outside of the axis, which belong to no bin.
     place = np.digitize(along, edges) - 1
     centres = 0.5 * (edges[1:] + edges[:-1])
     filled = [b for b in range(BINS) if np.count_nonzero(place == b) >= FEWEST]
+    # Only the cloud is thinned. The averages use every tick.
     every = max(1, math.ceil(len(along) / POINTS))
 
     def average(values: Array) -> Array:
@@ -269,6 +273,7 @@ def _by_position(view: View) -> Picture:
 
 def _by_acceleration(view: View) -> Picture:
     unit = "rad/s²" if view.angular else "m/s²"
+    # Central differences have no delay, which would turn the averages into a loop.
     acceleration = np.gradient(view.motion.speed, view.period)
     return _against(view, acceleration, "acceleration", "acceleration", unit)
 
@@ -331,6 +336,8 @@ def _phase(view: View) -> Picture:
     )
     curves = [PictureCurve("before", frequency[drawn], np.zeros(int(np.count_nonzero(drawn))))]
     for role in ("after", "measured"):
+        # scipy conjugates the first argument, so the angle is that of the signal against the base:
+        # a delay has a falling phase.
         _, cross = csd(base, signals[role], 1.0 / view.period, nperseg=length)
         angle = np.unwrap(np.angle(cross[drawn])) if drawn.any() else np.zeros(0)
         curves.append(PictureCurve(role, frequency[drawn], angle, points=role == "measured"))
@@ -361,6 +368,8 @@ def _line(view: View) -> Picture:
     A gain is a slope, an offset a shift and a saturation a plateau.
     """
     counted = view.counted
+    # The corrected prediction is a cloud as well: a lag or a play gives it several values for one
+    # nominal value.
     x, y, z = view.before[counted], view.measured[counted], view.after[counted]
     every = max(1, math.ceil(len(x) / POINTS))
     x, y, z = x[::every], y[::every], z[::every]
@@ -391,6 +400,7 @@ def _spectrum(view: View) -> Picture:
     # Imported here, because scipy.signal is slow to import and only a report needs it.
     from scipy.signal import welch
 
+    # `measured` lacks the mains line, which belongs into this picture.
     residual = (view.raw - view.after)[view.counted]
     length = _segment_length(view, len(residual))
     frequency, power = welch(residual - np.mean(residual), 1.0 / view.period, nperseg=length)

@@ -174,6 +174,8 @@ class Prices:
         unsteady_price (4 - z)^2 for z < 4. It is steeper once the interval of 2.5 standard errors
         contains the nominal value.
         """
+        # The price is continuous in the standard errors: with a threshold, a small change of the
+        # data could exchange the best hypothesis.
         t, evidence, price = self._thresholds, self._fitter.evidence, 0.0
         for effect, values, widths in zip(
             scored.fit.effects, scored.fit.values, scored.widths, strict=True

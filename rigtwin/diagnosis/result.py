@@ -120,6 +120,7 @@ class Diagnosis:
             One picture per effect, of held-out recordings if there are any. Empty where the data
             cannot be diagnosed.
         """
+        # What the correction was not fitted to is the stronger demonstration.
         shown = self.held_out or self.evidence
         if shown is None:
             return ()

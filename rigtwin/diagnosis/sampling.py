@@ -116,6 +116,7 @@ def find_outstanding(
             properties(r.column(*row.channel), rows[number], r.period, plant.mains.frequency)
             for r, rows in zip(recordings, predicted, strict=True)
         ]
+        # The median over recordings ignores a single one that was disturbed.
         table[row.name] = {
             key: float(np.median([part[key] for part in by_recording])) for key in PROPERTIES
         }

@@ -126,6 +126,7 @@ def _stands(
         travels.append(float(np.ptp(position)))
         pushes.append(_push(getattr(plant, pushers[0]), recording.column(*channel), position))
     held = float(getattr(plant, guides[0]).coulomb)
+    # A push that the nominal friction holds is no observation: the twin would stand still as well.
     if max(pushes) <= PUSHED * held or max(pushes) == 0.0:
         return None
     return Standstill(row.name, guides[0], pushers[0], max(pushes), max(travels))
@@ -136,6 +137,8 @@ def _is_still(position: Array) -> bool:
     if np.ptp(position) == 0.0:
         return True
     parts = np.array_split(position, BLOCKS)
+    # Means average the noise out and leave a slow drift. The range of 50 normal deviates is 4.5
+    # standard deviations on average, and hardly ever more than `NOISES`.
     span = float(np.ptp([np.mean(part) for part in parts]))
     noise = white_noise(position) / np.sqrt(len(parts[-1]))
     values = np.unique(position)

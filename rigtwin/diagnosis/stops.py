@@ -38,6 +38,7 @@ def find_stops(machine: Machine, recordings: Sequence[Recording]) -> list[str]:
     model = Mechanism(machine.model).model
     notes = []
     for name, component in machine.components.items():
+        # The sum or difference of several joints has no range of its own.
         if measures(getattr(machine.plant, name)) != "position" or len(component.acts_on) != 1:
             continue
         # A sensor may count against its joint. The coefficient is negative then, and sorting puts
@@ -49,6 +50,7 @@ def find_stops(machine: Machine, recordings: Sequence[Recording]) -> list[str]:
         low, high = np.sort(model.jnt_range[number] * coefficient)
         for recording in recordings:
             place = recording.column(*component.channel)
+            # A joint at its stop is measured with noise about it: hence a margin.
             at_stop = (place < low + NEAR * (high - low)) | (place > high - NEAR * (high - low))
             if at_stop.any():
                 first = int(np.argmax(at_stop))

@@ -37,6 +37,7 @@ INTERVAL_NOTE = (
 def format_distinct(first: float, second: float) -> tuple[str, str]:
     """Write two numbers to four digits, or to as many more as make the texts differ."""
     texts = "", ""
+    # A double has at most 17 significant digits, so 16 tell nearly any two apart.
     for digits in range(4, 17):
         texts = f"{first:.{digits}g}", f"{second:.{digits}g}"
         if texts[0] != texts[1]:
@@ -250,6 +251,7 @@ def sentence(verdict: Verdict, effects: Sequence[Finding], where: Sequence[Place
     if len(effects) > MOST_EFFECTS:
         shown = sorted(effects, key=lambda effect: -effect.share)[:MOST_EFFECTS]
         more = f"; and {len(effects) - MOST_EFFECTS} more effects that are smaller"
+    # One clause for each component, however many effects it has.
     parts: dict[str, list[str]] = {}
     for effect in shown:
         parts.setdefault(effect.name.component, []).append(_describe_effect(effect))
