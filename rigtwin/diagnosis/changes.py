@@ -210,7 +210,10 @@ def _with_trends(
     # The fit weighs by standard errors, `interval_half_width` to each side.
     trends = fit_trends(
         # The standard errors come from a jackknife, with one degree of freedom less than blocks.
-        values, half_widths / thresholds.interval_half_width, covariates, float(BLOCKS - 1)
+        values,
+        half_widths / thresholds.interval_half_width,
+        covariates,
+        float(BLOCKS - 1),
     )
     rivals, named = name_trends(
         trends, len(values), thresholds.trend_share, thresholds.trend_margin

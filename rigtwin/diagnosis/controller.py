@@ -54,7 +54,7 @@ class Deviation:
         `setting`, `missed_ticks` or `delay`; `unknown` if nothing reproduces the commands.
     name
         Name of the setting or of the parameter.
-    told
+    configured
         Value set by the operator, in `unit`.
     used
         Value that reproduces the commands, in `unit`.
@@ -66,7 +66,7 @@ class Deviation:
 
     kind: str
     name: str
-    told: float
+    configured: float
     used: float
     unit: str
     consequence: float = math.inf

@@ -172,9 +172,13 @@ def _check_presence(machine: Machine, recording: Recording, least: int) -> Itera
         return
     for topic, name in channels(machine):
         if not recording.has(topic, name):
-            there = ", ".join(f"{t}.{n}" for t, fields in recording.columns.items() for n in fields)
+            recorded = ", ".join(
+                f"{t}.{n}" for t, fields in recording.columns.items() for n in fields
+            )
             yield Fault(
-                "missing", f"{topic}.{name}", f"channel {topic}.{name} is missing; it has {there}"
+                "missing",
+                f"{topic}.{name}",
+                f"channel {topic}.{name} is missing; it has {recorded}",
             )
     lasts = recording.ticks * recording.period
     if recording.ticks < least:
@@ -306,18 +310,20 @@ def _check_order(machine: Machine, recording: Recording, predicted: Array) -> It
         if not 1 < len(rows) <= MOST_SWAPPED:
             continue
         names = [row.name for _, row in rows]
-        left = {}
+        misfits = {}
         for _, row in rows:
             for number, model in rows:
                 difference = recording.column(*row.channel) - predicted[number]
-                left[row.name, model.name] = rms(difference - np.mean(difference)) ** 2
+                misfits[row.name, model.name] = rms(difference - np.mean(difference)) ** 2
 
         def total(
             order: tuple[str, ...],
             names: list[str] = names,
-            left: dict[tuple[str, str], float] = left,
+            misfits: dict[tuple[str, str], float] = misfits,
         ) -> float:
-            return sum(left[name, model] for name, model in zip(names, order, strict=True)) ** 0.5
+            return (
+                sum(misfits[name, model] for name, model in zip(names, order, strict=True)) ** 0.5
+            )
 
         orders = list(permutations(names))
         least = min(total(order) for order in orders)
@@ -352,14 +358,17 @@ def _check_scale(machine: Machine, recording: Recording, predicted: Array) -> It
         a, b = (signal, model) if whole else (signal - signal.mean(), model - model.mean())
         if rms(b) == 0.0 or rms(a) < MOVES * white_noise(signal) or not np.isfinite(b).all():
             continue
-        alike, slope = float(a @ b) / float(np.sqrt((a @ a) * (b @ b))), float(a @ b / (b @ b))
-        # `alike` is the correlation of signal and prediction, and `slope` the regression of the
+        correlation, slope = (
+            float(a @ b) / float(np.sqrt((a @ a) * (b @ b))),
+            float(a @ b / (b @ b)),
+        )
+        # `correlation` is that of signal and prediction, and `slope` the regression of the
         # signal on the prediction: its scale.
-        if alike < -CORRELATED:
+        if correlation < -CORRELATED:
             yield Fault(
                 "sign", where, f"{where} has the wrong sign: it goes against what is predicted"
             )
-        elif alike > CORRELATED:
+        elif correlation > CORRELATED:
             near = any(
                 abs(np.log(factor / slope)) < SAME_UNIT for factor, _ in UNITS.get(row.unit, ())
             )
@@ -390,12 +399,14 @@ def _unexplained_scales(
             # the diagnosis.
             del suspicious[row]
     for unit in {row.unit for row in odd}:
-        alike = [row for row in odd if row.unit == unit]
-        if len(alike) == 2 and len([row for row in machine.rows if row.unit == unit]) > 2:
-            one, other = (odd[row] for row in alike)
-            if 0.5 < one / other < 2.0:
+        same_unit = [row for row in odd if row.unit == unit]
+        if len(same_unit) == 2 and len([row for row in machine.rows if row.unit == unit]) > 2:
+            first, second = (odd[row] for row in same_unit)
+            if 0.5 < first / second < 2.0:
                 # Two sensors that agree on something that hardly moves: it hardly moves.
-                suspicious = {row: slope for row, slope in suspicious.items() if row not in alike}
+                suspicious = {
+                    row: slope for row, slope in suspicious.items() if row not in same_unit
+                }
     return suspicious
 
 

@@ -465,7 +465,7 @@ def describe_controller(deviation: Deviation, confidence: float) -> Finding:
         deviation.used,
         deviation.used - spread,
         deviation.used + spread,
-        deviation.told,
+        deviation.configured,
         deviation.unit,
     )
     return Finding(
@@ -481,7 +481,7 @@ def describe_negligible(deviation: Deviation) -> str:
             f"the controller's commands differ by {share} from those of its settings; "
             "this causes no gap"
         )
-    used, configured = format_distinct(deviation.used, deviation.told)
+    used, configured = format_distinct(deviation.used, deviation.configured)
     unit = "" if deviation.unit == "1" else f" {deviation.unit}"
     return (
         f"the controller's {deviation.name} is {used}{unit} instead of {configured}{unit}, "

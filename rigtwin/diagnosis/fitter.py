@@ -145,8 +145,8 @@ class Fitter:
             return None
         joint = described[component].joint
         for number, row in enumerate(self.evidence.machine.rows):
-            same = row.name in described and described[row.name].joint == joint
-            if row.kind == "position" and joint is not None and same:
+            at_joint = row.name in described and described[row.name].joint == joint
+            if row.kind == "position" and joint is not None and at_joint:
                 return np.concatenate([lines.measured[number] for lines in self.evidence.lines])
         return None
 

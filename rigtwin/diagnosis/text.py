@@ -190,8 +190,8 @@ def _list_rivals(effect: Finding) -> str:
 def _describe_rival(rival: Rival) -> str:
     if not rival.parameters:
         return str(rival.name)
-    others = [f"{name} with {_list_values(values)}" for name, values in rival.beside]
-    beside = f", beside {enumerate_words(others)}" if others else ""
+    changed = [f"{name} with {_list_values(values)}" for name, values in rival.beside]
+    beside = f", beside {enumerate_words(changed)}" if changed else ""
     return f"{rival.name} ({_list_values(rival.parameters)}{beside})"
 
 

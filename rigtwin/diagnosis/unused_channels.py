@@ -79,7 +79,7 @@ def _explained_share(
         residuals.append(residual)
         known.append(np.stack([np.ones_like(speed), speed, sign], axis=1))
         new.append(np.stack([level, level * speed, level * sign], axis=1))
-    target, others = np.concatenate(residuals), np.concatenate(known)
+    target, known_regressors = np.concatenate(residuals), np.concatenate(known)
     columns = np.concatenate(new)
     # A constant channel is collinear with the known regressors, and nothing but rounding would
     # remain of it.
@@ -89,7 +89,7 @@ def _explained_share(
     stack = np.column_stack([target, columns])
     # By the theorem of Frisch, Waugh and Lovell, regressing what remains of both sides gives the
     # partial effect of the new regressors.
-    free = stack - others @ np.linalg.lstsq(others, stack, rcond=None)[0]
+    free = stack - known_regressors @ np.linalg.lstsq(known_regressors, stack, rcond=None)[0]
     residual, shapes = free[:, 0], free[:, 1:]
     fitted = shapes @ np.linalg.lstsq(shapes, residual, rcond=None)[0]
     return float(fitted @ fitted / max(float(residual @ residual), 1e-300))
