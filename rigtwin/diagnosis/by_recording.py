@@ -19,7 +19,7 @@ from itertools import pairwise
 import numpy as np
 
 from rigtwin.components import Effect
-from rigtwin.components.plant import Plant
+from rigtwin.components.plant import Plant, parameter_of, with_parameters
 from rigtwin.diagnosis.evidence import JUMPS, SPIKE, Evidence, despike
 from rigtwin.diagnosis.space import PRIOR
 from rigtwin.numerics.arrays import Array
@@ -62,17 +62,15 @@ class FreeParameter:
 
     def value_in(self, plant: Plant) -> float:
         """Return the parameter's value in a plant, SI."""
-        return float(getattr(getattr(plant, self.group), self.parameter))
+        return parameter_of(plant, self.group, self.parameter)
 
     def shift(self, plant: Plant, steps: float) -> Plant:
         """Return a plant with this parameter raised by a number of steps, within its bounds."""
-        part = getattr(plant, self.group)
         value = self.value_in(plant) + steps * self.step
         if self.effect is not None:
             quantity = self.effect.quantities()[self.parameter]
             value = min(max(value, quantity.low), quantity.high)
-        changed = part._replace(**{self.parameter: value, **dict(self.companions)})
-        return plant._replace(**{self.group: changed})
+        return with_parameters(plant, self.group, {self.parameter: value, **dict(self.companions)})
 
 
 @dataclass(frozen=True)

@@ -87,7 +87,7 @@ def find_confounded(
         exponents = -np.linalg.lstsq(columns, target, rcond=None)[0]
         if not _undoes(columns, exponents, target) or np.abs(exponents).max() > STEEPEST:
             continue
-        # Columns that resemble each other share an exponent; the simple law is reported if it holds.
+        # Columns that resemble each other share an exponent; a simple law is reported if it holds.
         simple = np.clip(np.round(exponents), -1.0, 1.0)
         exponents = simple if _undoes(columns, simple, target) else exponents
         involved = tuple(

@@ -9,6 +9,7 @@ from itertools import permutations
 import numpy as np
 
 from rigtwin.components import Schedule
+from rigtwin.components.sensors import sensor_of
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import OWN, Machine, Row
 from rigtwin.diagnosis.dead_commands import dead_commands
@@ -150,7 +151,7 @@ def channels(machine: Machine) -> list[tuple[str, str]]:
     required += [
         component.channel
         for name, component in machine.components.items()
-        if component.channel is not None and isinstance(getattr(machine.plant, name), Schedule)
+        if component.channel is not None and component.component_type is Schedule
     ]
     if machine.control is not None:
         required += machine.control.channels
@@ -254,7 +255,7 @@ def _check_alive(machine: Machine, recording: Recording, predicted: Array) -> It
             continue
         if component.element != "sensor":
             continue
-        bit = getattr(getattr(machine.plant, name), "resolution", 0.0)
+        bit = _declared_resolution(machine, name)
         # A sensor that resolves its declared bit shows noise all the time. A coarser one may
         # rightly repeat a value, for example while the machine rests.
         if bit > 0.0 and length >= STUCK and smallest_step(signal) <= COARSE * bit:
@@ -273,8 +274,15 @@ def _movers(machine: Machine) -> set[str]:
 
 def _is_at_rest(machine: Machine, row: Row, predicted: Array) -> bool:
     """Return whether a signal should stand still, because no command changes."""
-    bit = getattr(getattr(machine.plant, row.name, None), "resolution", 0.0)
-    return float(np.ptp(predicted)) <= bit
+    return float(np.ptp(predicted)) <= _declared_resolution(machine, row.name)
+
+
+def _declared_resolution(machine: Machine, name: str) -> float:
+    """Return the declared resolution of a sensor in its unit; 0 for a controller's command."""
+    component = machine.components.get(name)
+    if component is None or not component.quantity:
+        return 0.0
+    return sensor_of(machine.plant, name).resolution
 
 
 def _check_clipping(where: str, signal: Array) -> Iterator[Fault]:

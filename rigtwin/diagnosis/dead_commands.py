@@ -86,7 +86,7 @@ def _moving_follower(machine: Machine, recording: Recording, name: str) -> str |
     None if there is no such sensor.
     """
     mover = machine.components[name]
-    follows = isinstance(getattr(machine.plant, name), Cylinder | PositionActuator)
+    follows = mover.component_type in (Cylinder, PositionActuator)
     if not follows or not mover.joint:
         return None
     loads = [recording.column(*row.channel) for row in machine.rows if row.kind == "force"]

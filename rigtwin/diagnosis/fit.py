@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from rigtwin.components import Effect, Guide
 from rigtwin.components.guide import THROUGH_FRICTION
-from rigtwin.components.plant import P, Plant, with_parameters
+from rigtwin.components.plant import P, Plant, parameter_of, with_parameters
 
 Values = tuple[tuple[float, ...], ...]
 """Values of several effects: one tuple per effect, in the order of its kind's parameters."""
@@ -117,7 +117,7 @@ def is_possible(effects: Sequence[Effect], plant: Plant) -> bool:
         effect.of is not Guide
         or effect.kind.name not in THROUGH_FRICTION
         or effect.group in dry
-        or getattr(plant, effect.group).coulomb > 0.0
+        or parameter_of(plant, effect.group, "coulomb") > 0.0
         for effect in effects
     )
 

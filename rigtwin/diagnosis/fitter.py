@@ -18,7 +18,7 @@ import numpy as np
 from rigtwin.components import Effect, Guide, Scales, Starts
 from rigtwin.components.effect import Swing
 from rigtwin.components.guide import resists
-from rigtwin.components.plant import Plant
+from rigtwin.components.plant import Plant, component_of
 from rigtwin.diagnosis.evidence import JUMPS, Evidence
 from rigtwin.diagnosis.fit import Fit, Values, is_possible, with_values
 from rigtwin.diagnosis.gauss_newton import is_sufficient, minimise
@@ -500,7 +500,7 @@ class Fitter:
         So does a guide whose fitted friction would drive the motion.
         """
         guides = {effect.group for effect in fit.effects if effect.of is Guide}
-        if not all(resists(getattr(fit.plant, name)) for name in guides):
+        if not all(resists(component_of(fit.plant, name, Guide)) for name in guides):
             return True
         low, high = self.bounds(fit.effects)
         values = np.concatenate([np.asarray(numbers) for numbers in fit.values])

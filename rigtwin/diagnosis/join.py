@@ -14,7 +14,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from rigtwin.components.plant import Plant
+from rigtwin.components.plant import Plant, select
 from rigtwin.diagnosis.cross_validation import gap_level
 from rigtwin.diagnosis.evidence import Evidence, relative_errors
 from rigtwin.diagnosis.finding import Answer, Finding, Gap, Interval, Step, Verdict
@@ -138,7 +138,7 @@ def _merge_plants(plant: Plant, parts: Sequence[Diagnosis]) -> Plant:
         name: component
         for part in parts
         for name, component in part.corrected.plant._asdict().items()
-        if component != getattr(plant, name)
+        if (component,) != select(plant, [name])
     }
     return plant._replace(**changed)
 

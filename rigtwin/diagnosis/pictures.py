@@ -15,9 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rigtwin.components import with_parameters
 from rigtwin.components.effect import GROUPS, Motion
-from rigtwin.components.plant import Plant
+from rigtwin.components.plant import Plant, parameter_of, select, with_parameters
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.finding import Finding
 from rigtwin.diagnosis.localisation import is_angular
@@ -545,10 +544,15 @@ def without_effect(nominal: Plant, corrected: Plant, effect: Finding) -> Plant:
         Plant with all other corrections.
     """
     group = GROUPS.get(effect.name.component, effect.name.component)
-    component = getattr(nominal, group, None)
-    fields: tuple[str, ...] = getattr(component, "_fields", ())
-    values = {name: float(getattr(component, name)) for name in effect.parameters if name in fields}
-    return with_parameters(corrected, group, values) if values else corrected
+    if group not in nominal._fields:
+        return corrected
+    (component,) = select(nominal, [group])
+    values = {
+        name: parameter_of(nominal, group, name)
+        for name in effect.parameters
+        if name in component._fields
+    }
+    return with_parameters(corrected, group, values)
 
 
 def picture(evidence: Evidence, corrected: Plant, effect: Finding) -> Picture:

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from rigtwin.components import with_parameters
 from rigtwin.components.effect import GROUPS
+from rigtwin.components.plant import select, with_parameters
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Machine
 from rigtwin.description.mjcf import Change, write_mjcf
@@ -80,7 +80,10 @@ class Diagnosis:
         plant = self.corrected.plant
         for effect in self.effects:
             group = GROUPS.get(effect.name.component, "")
-            if group and all(name in getattr(plant, group)._fields for name in effect.parameters):
+            if not group:
+                continue
+            (component,) = select(plant, [group])
+            if all(name in component._fields for name in effect.parameters):
                 # Delays and missed ticks of the computer are read off the controller's commands, so
                 # `corrected` lacks them; the twin needs them as much as the plant's defects.
                 values = {name: estimate.value for name, estimate in effect.parameters.items()}

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigtwin.components import measures
-from rigtwin.components.plant import Plant
+from rigtwin.components.plant import Plant, parameter_of
+from rigtwin.components.sensors import sensor_of
 from rigtwin.description.machine import Machine
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
@@ -109,8 +109,10 @@ def find_outstanding(
     """
     table: dict[str, dict[str, float]] = {}
     for number, row in enumerate(machine.rows):
-        sensor = getattr(plant, row.name, None)
-        if sensor is None or not measures(sensor) or sensor.white == 0.0:
+        component = machine.components.get(row.name)
+        if component is None or not component.quantity:
+            continue
+        if sensor_of(plant, row.name).white == 0.0:
             continue
         by_recording = [
             properties(r.column(*row.channel), rows[number], r.period, plant.mains.frequency)
@@ -123,7 +125,7 @@ def find_outstanding(
     possible = {effect.name for effect in machine.effects()}
     outstanding: list[SensorProperty] = []
     for parameter, kind in PROPERTIES.items():
-        nominal = {name: float(getattr(getattr(plant, name), parameter)) for name in table}
+        nominal = {name: parameter_of(plant, name, parameter) for name in table}
         # A sensor whose nominal value is 0 cannot have this property.
         ratios = {
             name: values[parameter] / nominal[name] if nominal[name] > 0.0 else 0.0

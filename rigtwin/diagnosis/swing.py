@@ -31,7 +31,7 @@ def swings(machine: Machine, recordings: Sequence[Recording]) -> dict[str, Swing
     """
     by_component: dict[str, Swing] = {}
     for component in machine.components.values():
-        followed = isinstance(getattr(machine.plant, component.name), Schedule)
+        followed = component.component_type is Schedule
         if component.channel is None or (component.channel[0] != "/command" and not followed):
             continue
         # A recording of a set may lack a command that another one has.
