@@ -20,8 +20,9 @@ import numpy as np
 
 from rigtwin.components import Effect
 from rigtwin.components.plant import Plant, parameter_of, with_parameters
-from rigtwin.diagnosis.evidence import JUMPS, SPIKE, Evidence, despike
+from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.space import PRIOR
+from rigtwin.diagnosis.spikes import JUMPS, SPIKE, despike
 from rigtwin.numerics.arrays import Array
 
 BLOCKS = 10

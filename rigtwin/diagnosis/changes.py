@@ -72,12 +72,7 @@ def find_changes(
         aligned, zeros, search = _align_zeros(
             machine, recordings, diagnose_set, progress, thresholds
         )
-        model = search.compare()
-        has_change = any(parameter.verdict == "changed" for parameter in model.parameters)
-        # A restart costs two more diagnoses, so it is made only where there is something to
-        # explain.
-        if has_change or search.together.verdict not in ("no gap", "explained"):
-            model = _restart(model, search, (aligned[0], aligned[-1]), diagnose_set, thresholds)
+        model = _find_best_model(search, aligned, diagnose_set, thresholds)
     covariates = _covariates(search.evidence)
     # Trends are fitted last: they describe a change, and do not decide whether there is one.
     parameters = tuple(
@@ -129,6 +124,21 @@ def _align_zeros(
         if values.any()
     }
     return aligned, zeros, search
+
+
+def _find_best_model(
+    search: ChangeSearch,
+    aligned: Sequence[Recording],
+    diagnose_set: Callable[[Sequence[Recording]], Diagnosis],
+    thresholds: Thresholds,
+) -> ChangeModel:
+    """Search for changes, and once more from the first and the last recording if that may help."""
+    model = search.compare()
+    has_change = any(parameter.verdict == "changed" for parameter in model.parameters)
+    # A restart costs two more diagnoses, so it is made only where there is something to explain.
+    if has_change or search.together.verdict not in ("no gap", "explained"):
+        return _restart(model, search, (aligned[0], aligned[-1]), diagnose_set, thresholds)
+    return model
 
 
 def _restart(

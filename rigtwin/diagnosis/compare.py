@@ -200,20 +200,8 @@ def compare_recordings(
         If a recording belongs to another machine, the periods differ, the common length is too
         short, or no sensor is in both.
     """
-    for recording in (first, second):
-        if recording.machine != machine.name:
-            raise RigtwinError(
-                f"{recording.path}: it is of machine {recording.machine!r}; "
-                f"expected {machine.name!r}"
-            )
-    if first.period != second.period:
-        raise RigtwinError(
-            f"periods differ: {first.path} has {first.period:g} "
-            f"s, {second.path} has {second.period:g} s"
-        )
+    _require_comparable(machine, first, second)
     ticks = min(first.ticks, second.ticks)
-    if ticks < SHORTEST:
-        raise RigtwinError(f"only {ticks} ticks in common; a comparison needs at least {SHORTEST}")
     results: dict[str, Residual] = {}
     still: list[str] = []
     sensors = [
@@ -249,3 +237,21 @@ def compare_recordings(
             "stand still in both"
         )
     return results
+
+
+def _require_comparable(machine: Machine, first: Recording, second: Recording) -> None:
+    """Raise RigtwinError unless two recordings can be compared tick by tick."""
+    for recording in (first, second):
+        if recording.machine != machine.name:
+            raise RigtwinError(
+                f"{recording.path}: it is of machine {recording.machine!r}; "
+                f"expected {machine.name!r}"
+            )
+    if first.period != second.period:
+        raise RigtwinError(
+            f"periods differ: {first.path} has {first.period:g} "
+            f"s, {second.path} has {second.period:g} s"
+        )
+    ticks = min(first.ticks, second.ticks)
+    if ticks < SHORTEST:
+        raise RigtwinError(f"only {ticks} ticks in common; a comparison needs at least {SHORTEST}")

@@ -35,9 +35,6 @@ from rigtwin.diagnosis.finding import (
 from rigtwin.diagnosis.findings import (
     choose_named,
     describe_attributed,
-    describe_controller,
-    describe_negligible,
-    describe_sensor,
     find_nearest,
     find_traces,
     list_unobservable,
@@ -53,6 +50,11 @@ from rigtwin.diagnosis.regressors import describe_correlation
 from rigtwin.diagnosis.result import Diagnosis
 from rigtwin.diagnosis.sampling import SensorProperty, find_outstanding
 from rigtwin.diagnosis.short_recordings import drop_short, least_ticks
+from rigtwin.diagnosis.signal_findings import (
+    describe_controller,
+    describe_negligible,
+    describe_sensor,
+)
 from rigtwin.diagnosis.standstill import describe_standstill, find_standstill
 from rigtwin.diagnosis.stops import find_cut_commands, find_stops
 from rigtwin.diagnosis.support import Support
@@ -225,13 +227,7 @@ def diagnose(
         same data as fitted ones.
     """
     started = time.perf_counter()
-    # Copies go before short recordings: with one of two left, the stricter limits of a single
-    # recording apply.
-    recordings, notes = drop_copies(recordings)
-    refuse_copies(held_out, recordings)
-    recordings, short = drop_short(recordings)
-    held_out, short_held_out = drop_short(held_out)
-    notes += [*short, *short_held_out]
+    recordings, held_out, notes = _drop_unneeded(recordings, held_out)
     # BLAS threads would compete with the threads of the search.
     with threadpool_limits(1):
         configurations = [machine.configuration_of(recording, base) for recording in recordings]
@@ -244,11 +240,7 @@ def diagnose(
             return Diagnosis(unusable, machine, None, configurations[0])
         judging_configurations = _configure_held_out(machine, held_out, base)
 
-        notes += [
-            f"{recording.path.name}: {line}"
-            for recording in recordings
-            for line in find_contacts(machine, recording)
-        ]
+        notes += _contact_notes(machine, recordings)
 
         def evidence_of(part: Machine) -> tuple[Evidence, Evidence | None]:
             judging = Evidence(part, held_out, judging_configurations) if held_out else None
@@ -263,6 +255,27 @@ def diagnose(
         if len(parts) == 1:
             return _with_notes(parts[0], notes)
         return _with_notes(join(*evidence_of(machine), parts, started), notes)
+
+
+def _drop_unneeded(
+    recordings: Sequence[Recording], held_out: Sequence[Recording]
+) -> tuple[list[Recording], list[Recording], list[str]]:
+    """Leave out copies and recordings that are too short, with a note for each."""
+    # Copies go before short recordings: with one of two left, the stricter limits of a single
+    # recording apply.
+    distinct, notes = drop_copies(recordings)
+    refuse_copies(held_out, distinct)
+    fitted, short = drop_short(distinct)
+    judging, short_held_out = drop_short(held_out)
+    return fitted, judging, [*notes, *short, *short_held_out]
+
+
+def _contact_notes(machine: Machine, recordings: Sequence[Recording]) -> list[str]:
+    return [
+        f"{recording.path.name}: {line}"
+        for recording in recordings
+        for line in find_contacts(machine, recording)
+    ]
 
 
 def _configure_held_out(

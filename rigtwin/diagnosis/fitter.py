@@ -19,10 +19,11 @@ from rigtwin.components import Effect, Guide, Scales, Starts
 from rigtwin.components.effect import Swing
 from rigtwin.components.guide import resists
 from rigtwin.components.plant import Plant, component_of
-from rigtwin.diagnosis.evidence import JUMPS, Evidence
+from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.fit import Fit, Values, is_possible, with_values
 from rigtwin.diagnosis.gauss_newton import is_sufficient, minimise
 from rigtwin.diagnosis.space import Space
+from rigtwin.diagnosis.spikes import JUMPS
 from rigtwin.diagnosis.swing import swings
 from rigtwin.numerics.arrays import Array
 

@@ -17,7 +17,7 @@ import numpy as np
 from rigtwin.components.plant import Plant, select
 from rigtwin.diagnosis.cross_validation import gap_level
 from rigtwin.diagnosis.evidence import Evidence, relative_errors
-from rigtwin.diagnosis.finding import Answer, Finding, Gap, Interval, Step, Verdict
+from rigtwin.diagnosis.finding import Answer, Finding, Gap, Interval, Place, Step, Verdict
 from rigtwin.diagnosis.result import Diagnosis
 from rigtwin.diagnosis.text import sentence
 from rigtwin.diagnosis.units import write
@@ -53,25 +53,13 @@ def join(
     corrected = parts[0].corrected._replace(plant=_merge_plants(evidence.plant, parts))
     weights = _weights(parts)
     gap = _join_gaps(evidence, corrected.plant, answers, weights)
-    effects = tuple(
-        replace(effect, share=weight * effect.share)
-        for answer, weight in zip(answers, weights, strict=True)
-        for effect in answer.effects
-    )
-    where = sorted(
-        (
-            replace(place, share=weight * place.share)
-            for answer, weight in zip(answers, weights, strict=True)
-            for place in answer.where
-        ),
-        key=lambda place: -place.share,
-    )
+    effects, where = _join_effects(answers, weights), _join_places(answers, weights)
     verdict = _join_verdicts([answer.verdict for answer in answers], bool(effects))
     answer = Answer(
         verdict=verdict,
         sentence=sentence(verdict, effects, where, gap),
         effects=effects,
-        where=tuple(where),
+        where=where,
         gap=gap,
         ranking=tuple(_unique(answer.ranking[:RANKED] for answer in answers)),
         not_observable=tuple(_unique(answer.not_observable for answer in answers)),
@@ -90,6 +78,25 @@ def join(
     )
     otherwise = tuple(pair for part in parts for pair in part.otherwise)
     return Diagnosis(answer, evidence.machine, evidence, corrected, otherwise, held_out)
+
+
+def _join_effects(answers: Sequence[Answer], weights: Sequence[float]) -> tuple[Finding, ...]:
+    """Effects of all parts, with their shares of the machine's gap."""
+    return tuple(
+        replace(effect, share=weight * effect.share)
+        for answer, weight in zip(answers, weights, strict=True)
+        for effect in answer.effects
+    )
+
+
+def _join_places(answers: Sequence[Answer], weights: Sequence[float]) -> tuple[Place, ...]:
+    """Places of all parts with their shares of the machine's gap, the largest first."""
+    places = (
+        replace(place, share=weight * place.share)
+        for answer, weight in zip(answers, weights, strict=True)
+        for place in answer.where
+    )
+    return tuple(sorted(places, key=lambda place: -place.share))
 
 
 def _describe_shared_delay(effects: Sequence[Finding]) -> Iterator[str]:

@@ -203,24 +203,12 @@ def fit_effects(
         For no effect, or one that cannot act on this machine together with the others.
     """
     effects = tuple(effects)
-    if not effects:
-        possible = ", ".join(effect.name for effect in evidence.machine.effects())
-        raise RigtwinError(f"no effect to fit; expected some of {possible}")
-    if not is_possible(effects, evidence.plant):
-        names = ", ".join(effect.name for effect in effects)
-        raise RigtwinError(
-            f"{names}: an effect lacks what it acts through, as play lacks dry friction"
-        )
+    _require_possible(evidence, effects)
     exact = Fitter(evidence)
     thinned = evidence.thin().halve_steps()
     # A model that integrates nothing has nothing coarser.
     coarse = exact if thinned.models == evidence.models else Fitter(thinned)
-    optima: list[Fit] = []
-    for start in _list_starts(coarse, effects, progress):
-        optima.append(coarse.refine(effects, start))
-        progress(1)
-        if _is_settled(coarse, optima):
-            break
+    optima = _find_optima(coarse, effects, progress)
     settled = _is_settled(coarse, optima)
     optima.sort(key=lambda fit: fit.misfit)
     # A settled optimum needs no further starts nearby.
@@ -245,6 +233,31 @@ def fit_effects(
         evidence=evidence,
         held_out=held_out,
     )
+
+
+def _require_possible(evidence: Evidence, effects: tuple[Effect, ...]) -> None:
+    """Raise RigtwinError unless there are effects, and each has what it acts through."""
+    if not effects:
+        possible = ", ".join(effect.name for effect in evidence.machine.effects())
+        raise RigtwinError(f"no effect to fit; expected some of {possible}")
+    if not is_possible(effects, evidence.plant):
+        names = ", ".join(effect.name for effect in effects)
+        raise RigtwinError(
+            f"{names}: an effect lacks what it acts through, as play lacks dry friction"
+        )
+
+
+def _find_optima(
+    fitter: Fitter, effects: tuple[Effect, ...], progress: Callable[[int], object]
+) -> list[Fit]:
+    """Fit from one start after another, until no further start can find another optimum."""
+    optima: list[Fit] = []
+    for start in _list_starts(fitter, effects, progress):
+        optima.append(fitter.refine(effects, start))
+        progress(1)
+        if _is_settled(fitter, optima):
+            break
+    return optima
 
 
 def _errors(evidence: Evidence | None, plant: Plant) -> tuple[float, ...]:
