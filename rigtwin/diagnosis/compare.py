@@ -13,10 +13,10 @@ from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Machine
 from rigtwin.diagnosis.contacts import find_contacts
 from rigtwin.diagnosis.copies import digest
-from rigtwin.diagnosis.cross_validation import gap_level
 from rigtwin.diagnosis.data_checks import SHORTEST, require_fit
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.residual import Residual, compute_residual
+from rigtwin.diagnosis.shrinkage import gap_level
 from rigtwin.errors import RigtwinError
 from rigtwin.recording import Recording
 from rigtwin.signals.noise import remove_mains, white_noise

@@ -22,7 +22,7 @@ from bokeh.resources import Resources
 from markupsafe import Markup
 
 from rigtwin.diagnosis.overlay import Overlay
-from rigtwin.diagnosis.pictures import Picture, PictureCurve
+from rigtwin.diagnosis.picture import Picture, PictureCurve
 from rigtwin.diagnosis.units import find_unit, spell
 from rigtwin.numerics.arrays import Array
 

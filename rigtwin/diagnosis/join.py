@@ -15,10 +15,10 @@ from typing import TypeVar
 import numpy as np
 
 from rigtwin.components.plant import Plant, select
-from rigtwin.diagnosis.cross_validation import gap_level
 from rigtwin.diagnosis.evidence import Evidence, relative_errors
 from rigtwin.diagnosis.finding import Answer, Finding, Gap, Interval, Place, Step, Verdict
 from rigtwin.diagnosis.result import Diagnosis
+from rigtwin.diagnosis.shrinkage import gap_level
 from rigtwin.diagnosis.text import sentence
 from rigtwin.diagnosis.units import write
 from rigtwin.diagnosis.words import enumerate_words

@@ -16,7 +16,8 @@ from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.finding import Answer, Finding, Gap, Place, Verdict
 from rigtwin.diagnosis.fit import Fit
 from rigtwin.diagnosis.overlay import Overlay, overlay
-from rigtwin.diagnosis.pictures import Picture, picture
+from rigtwin.diagnosis.picture import Picture
+from rigtwin.diagnosis.pictures import picture
 from rigtwin.files import forbid_overwriting
 
 
