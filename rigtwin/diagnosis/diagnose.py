@@ -60,7 +60,6 @@ from rigtwin.diagnosis.thresholds import STANDARD, Thresholds
 from rigtwin.diagnosis.unknown_input import DisturbanceFit, locate_disturbance
 from rigtwin.diagnosis.unused_channels import describe_unused
 from rigtwin.diagnosis.usable_data import (
-    answer_standstill,
     answer_unusable,
     drop_unneeded,
     recording_notes,
@@ -156,30 +155,36 @@ def diagnose(
     # BLAS threads would compete with the threads of the search.
     with threadpool_limits(1):
         configurations = [machine.configuration_of(recording, base) for recording in recordings]
-        # The standstill is asked for first: the data checks would call a sensor dead that rightly
-        # saw no motion.
-        unusable = answer_standstill(machine, recordings, started) or answer_unusable(
-            machine, recordings, configurations, started
-        )
+        unusable = answer_unusable(machine, recordings, configurations, started)
         if unusable is not None:
             return Diagnosis(unusable, machine, None, configurations[0])
         judging_configurations = _configure_held_out(machine, held_out, base)
-
         notes += _contact_notes(machine, recordings)
 
         def evidence_of(part: Machine) -> tuple[Evidence, Evidence | None]:
             judging = Evidence(part, held_out, judging_configurations) if held_out else None
             return Evidence(part, recordings, configurations), judging
 
-        # Joints that do not act on each other are diagnosed one by one: their effects cannot be
-        # confounded, and the search is much smaller.
-        parts = [
-            _diagnose_part(*evidence_of(part), tests, progress, first_look, thresholds, started)
-            for part in machine.physics.split(machine)
-        ]
-        if len(parts) == 1:
-            return _with_notes(parts[0], notes)
-        return _with_notes(join(*evidence_of(machine), parts, started), notes)
+        def diagnose_part(part: Machine) -> Diagnosis:
+            return _diagnose_part(
+                *evidence_of(part), tests, progress, first_look, thresholds, started
+            )
+
+        return _with_notes(_diagnose_parts(machine, evidence_of, diagnose_part, started), notes)
+
+
+def _diagnose_parts(
+    machine: Machine,
+    evidence_of: Callable[[Machine], tuple[Evidence, Evidence | None]],
+    diagnose_part: Callable[[Machine], Diagnosis],
+    started: float,
+) -> Diagnosis:
+    """Diagnose the independent parts of a machine, and join their answers."""
+    # Joints that do not act on each other are diagnosed one by one: their effects cannot be
+    # confounded, and the search is much smaller.
+    parts = [diagnose_part(part) for part in machine.physics.split(machine)]
+    # Joining needs evidence of the whole machine, which costs further predictions.
+    return parts[0] if len(parts) == 1 else join(*evidence_of(machine), parts, started)
 
 
 def _contact_notes(machine: Machine, recordings: Sequence[Recording]) -> list[str]:

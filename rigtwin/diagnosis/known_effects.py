@@ -94,16 +94,7 @@ def fit_effects(
     effects = tuple(effects)
     _require_possible(evidence, effects)
     exact = Fitter(evidence)
-    thinned = evidence.thin().halve_steps()
-    # A model that integrates nothing has nothing coarser.
-    coarse = exact if thinned.models == evidence.models else Fitter(thinned)
-    optima = _find_optima(coarse, effects, progress)
-    settled = _is_settled(coarse, optima)
-    optima.sort(key=lambda fit: fit.misfit)
-    # A settled optimum needs no further starts nearby.
-    restarts = () if settled else PERTURBATIONS
-    fit = exact.refit_with_tolerances(optima[0], restarts)
-    progress(1)
+    fit, optima = _fit_jointly(exact, effects, progress)
     covariance = _find_covariance(exact, fit)
     parameters = _list_parameters(evidence.machine, fit, covariance)
     plant = with_values(evidence.plant, effects, fit.values)
@@ -122,6 +113,27 @@ def fit_effects(
         evidence=evidence,
         held_out=held_out,
     )
+
+
+def _fit_jointly(
+    exact: Fitter, effects: tuple[Effect, ...], progress: Callable[[int], object]
+) -> tuple[Fit, list[Fit]]:
+    """Fit effects on coarse evidence from several starts, and the best optimum on all of it.
+
+    Returns the precise fit, and the coarse optima, the best first.
+    """
+    evidence = exact.evidence
+    thinned = evidence.thin().halve_steps()
+    # A model that integrates nothing has nothing coarser.
+    coarse = exact if thinned.models == evidence.models else Fitter(thinned)
+    optima = _find_optima(coarse, effects, progress)
+    # Asked before sorting: the first start is the one that the others are compared with.
+    settled = _is_settled(coarse, optima)
+    optima.sort(key=lambda fit: fit.misfit)
+    # A settled optimum needs no further starts nearby.
+    fit = exact.refit_with_tolerances(optima[0], () if settled else PERTURBATIONS)
+    progress(1)
+    return fit, optima
 
 
 def _require_possible(evidence: Evidence, effects: tuple[Effect, ...]) -> None:

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 from numpy.fft import rfft, rfftfreq
+from numpy.typing import NDArray
 from scipy.fft import next_fast_len
 
 from rigtwin.components.plant import Plant
@@ -107,19 +108,11 @@ def weigh_lines(
     # The band is limited before ticks are left out, or what lies above the new Nyquist frequency
     # would alias into it. The copy is needed, as the mains line is subtracted from it in place.
     measured = limit_band(whole, model.band, recording.period)[:, :: model.every].copy()
-    ticks = measured.shape[1]
     period = model.every * recording.period
     limited = math.isfinite(model.band)
-    # The FFT is fastest at lengths with small prime factors; zeros are appended.
-    length = int(next_fast_len(ticks, real=True) or ticks)
-    frequency = rfftfreq(length, period)
-    # 0.5 / period is the Nyquist frequency. The lines just below it contain what sampling folds
-    # back.
-    used = frequency <= min(HIGHEST_FREQUENCY, 0.4 / period, model.band)
-    # A recording of duration T resolves frequencies to 1 / T, so in a short one the mains line is
-    # as broad as that.
-    width = max(MAINS_WIDTH, 2.0 / (ticks * period))
-    off_mains = np.abs(frequency[used] - plant.mains.frequency) > width
+    length, frequency, off_mains = _choose_lines(
+        measured.shape[1], period, model.band, plant.mains.frequency
+    )
     floor, resolution = _noise_floors(whole)
     fade = _windows(recording, model, whole, counted)
     propagated = model.propagated_noise(plant)
@@ -128,17 +121,8 @@ def weigh_lines(
         floor[[row.kind == "command" for row in machine.rows]] = 0.0
     # Noise was filtered before ticks were left out, so none is folded into the band.
     folded = 1.0 / model.every if limited else 1.0
-    spread = _noise_variance(machine, fade, floor, propagated, folded, length, int(used.sum()))
-    error = np.stack(
-        [
-            _model_error(
-                np.abs(rfft(window * (signal - np.mean(signal)), length)[used]) ** 2,
-                machine.form_of(row),
-                machine.prior.even,
-            )
-            for window, signal, row in zip(fade, measured, machine.rows, strict=True)
-        ]
-    )
+    spread = _noise_variance(machine, fade, floor, propagated, folded, length, len(frequency))
+    error = _declared_error(machine, fade, measured, length, len(frequency))
     weight = off_mains / np.sqrt(spread + error + 1e-300)
     if limited:
         # The band limit leaves only the share of white noise within it, and smooths the bits.
@@ -148,7 +132,7 @@ def weigh_lines(
         floor = np.sqrt(floor**2 + np.var(propagated, axis=1))
     floor = np.maximum(floor, 1e-300)
     return Lines(
-        frequency=frequency[used],
+        frequency=frequency,
         weight=weight,
         spread=spread,
         fade=fade,
@@ -158,6 +142,38 @@ def weigh_lines(
         length=length,
         period=period,
     )
+
+
+def _choose_lines(
+    ticks: int, period: float, band: float, mains: float
+) -> tuple[int, Array, NDArray[np.bool_]]:
+    """Return the transform's length, the compared frequencies, and which are off the mains.
+
+    The compared lines are the lowest ones, so they are the beginning of every spectrum.
+    """
+    # The FFT is fastest at lengths with small prime factors; zeros are appended.
+    length = int(next_fast_len(ticks, real=True) or ticks)
+    frequency = rfftfreq(length, period)
+    # 0.5 / period is the Nyquist frequency. The lines just below it contain what sampling folds
+    # back.
+    frequency = frequency[frequency <= min(HIGHEST_FREQUENCY, 0.4 / period, band)]
+    # A recording of duration T resolves frequencies to 1 / T, so in a short one the mains line is
+    # as broad as that.
+    width = max(MAINS_WIDTH, 2.0 / (ticks * period))
+    return length, frequency, np.abs(frequency - mains) > width
+
+
+def _declared_error(
+    machine: Machine, fade: Array, measured: Array, length: int, count: int
+) -> Array:
+    """Return the variance of the declared model error of all signals, shape (rows, lines)."""
+    errors = []
+    for window, signal, row in zip(fade, measured, machine.rows, strict=True):
+        # Without the mean: the window would spread its power over the lowest lines.
+        swing = window * (signal - np.mean(signal))
+        power = np.abs(rfft(swing, length)[:count]) ** 2
+        errors.append(_model_error(power, machine.form_of(row), machine.prior.even))
+    return np.stack(errors)
 
 
 def _noise_floors(whole: Array) -> tuple[Array, Array]:

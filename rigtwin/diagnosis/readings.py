@@ -44,7 +44,22 @@ class SignalReadings:
 
 
 def read_signals(evidence: Evidence, plant: Plant, thresholds: Thresholds) -> SignalReadings:
-    """Compare controller and sensors with their settings."""
+    """Compare controller and sensors with their settings.
+
+    Parameters
+    ----------
+    evidence
+        Recordings that were fitted.
+    plant
+        Corrected plant, whose residual shows the sensors' noise.
+    thresholds
+        Thresholds of the diagnosis.
+
+    Returns
+    -------
+    SignalReadings
+        Deviations of sensors and controller.
+    """
     deviations = _controller_deviations(evidence)
     negligible = tuple(
         deviation
@@ -65,6 +80,22 @@ def read_signals(evidence: Evidence, plant: Plant, thresholds: Thresholds) -> Si
 def describe_readings(
     readings: SignalReadings, evidence: Evidence, thresholds: Thresholds
 ) -> list[Finding]:
+    """Describe the deviations of sensors and controller that are findings.
+
+    Parameters
+    ----------
+    readings
+        Deviations that were read off signals.
+    evidence
+        Recordings that were read.
+    thresholds
+        Thresholds of the diagnosis.
+
+    Returns
+    -------
+    list of Finding
+        Sensors first, then settings of the controller.
+    """
     return [
         *(
             describe_sensor(sensor, evidence, thresholds.highest_confidence)

@@ -23,6 +23,37 @@ def answer_unusable(
     configurations: Sequence[Configuration],
     started: float,
 ) -> Answer | None:
+    """Answer for recordings that cannot be diagnosed.
+
+    Parameters
+    ----------
+    machine
+        Machine that was recorded.
+    recordings
+        Recordings fitted jointly.
+    configurations
+        Configuration of the twin for each recording.
+    started
+        Time at which the diagnosis began, s, by `time.perf_counter`.
+
+    Returns
+    -------
+    Answer or None
+        Answer that says why. None where the recordings can be diagnosed.
+    """
+    # The standstill is asked for first: the data checks would call a sensor dead that rightly saw
+    # no motion.
+    return _answer_standstill(machine, recordings, started) or _answer_faults(
+        machine, recordings, configurations, started
+    )
+
+
+def _answer_faults(
+    machine: Machine,
+    recordings: Sequence[Recording],
+    configurations: Sequence[Configuration],
+    started: float,
+) -> Answer | None:
     """Answer for recordings with a fault that forbids a diagnosis; None where there is none."""
     faults = [
         f"{recording.path}: {fault.message}"
@@ -48,7 +79,7 @@ def answer_unusable(
     )
 
 
-def answer_standstill(
+def _answer_standstill(
     machine: Machine, recordings: Sequence[Recording], started: float
 ) -> Answer | None:
     """Answer for recordings in which nothing moved; None where something did."""
@@ -66,6 +97,7 @@ def answer_standstill(
 
 
 def recording_notes(recordings: Sequence[Recording]) -> tuple[str, ...]:
+    """Return the notes that the reader made of each recording, with its file's name."""
     return tuple(
         f"{recording.path.name}: {note}" for recording in recordings for note in recording.notes
     )
@@ -74,7 +106,25 @@ def recording_notes(recordings: Sequence[Recording]) -> tuple[str, ...]:
 def drop_unneeded(
     recordings: Sequence[Recording], held_out: Sequence[Recording]
 ) -> tuple[list[Recording], list[Recording], list[str]]:
-    """Leave out copies and recordings that are too short, with a note for each."""
+    """Leave out copies and recordings that are too short.
+
+    Parameters
+    ----------
+    recordings
+        Recordings fitted jointly.
+    held_out
+        Recordings that judge the correction.
+
+    Returns
+    -------
+    tuple
+        Recordings and held-out recordings that remain, and a note for each that is left out.
+
+    Raises
+    ------
+    RigtwinError
+        If a held-out recording has the same content as a fitted one.
+    """
     # Copies go before short recordings: with one of two left, the stricter limits of a single
     # recording apply.
     distinct, notes = drop_copies(recordings)
