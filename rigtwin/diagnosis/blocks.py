@@ -73,6 +73,7 @@ def find_bands(lines: int, even: float) -> list[slice]:
     """
     if even == 1.0:
         return [slice(0, lines)]
+    # The width doubles from band to band, as on a logarithmic axis of frequency.
     edges, width = [0], NARROWEST
     # A band ends only where the next one, twice as wide, is complete. The last band takes the rest,
     # so that no band at the top is nearly empty.

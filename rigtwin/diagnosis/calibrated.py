@@ -105,6 +105,7 @@ def _posterior(diagnosis: Diagnosis) -> Posterior:
 
 def _alternative(fit: Fit, probability: float) -> Alternative:
     """Other explanation as changes of the plant, by component."""
+    # Two effects of one component share its table.
     changes: dict[str, dict[str, object]] = {}
     for effect, values in zip(fit.effects, fit.values, strict=True):
         changes.setdefault(effect.group, {}).update(

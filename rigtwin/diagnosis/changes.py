@@ -191,6 +191,7 @@ def _covariates(evidence: Evidence) -> dict[str, Array]:
         )
     )
     for topic, name in sorted(shared):
+        # Recordings have no type of channel for a temperature, so its name has to tell.
         if "temp" in name.lower():
             covariates[f"temperature ({topic}.{name})"] = np.array(
                 [float(np.mean(r.column(topic, name))) for r in evidence.recordings]

@@ -167,6 +167,7 @@ def differences(first: Recording, second: Recording) -> tuple[str, ...]:
         deviation = (
             first.column("/command", "ground")[:ticks] - second.column("/command", "ground")[:ticks]
         )
+        # Commands are the same up to the rounding of a file; a micrometre is far above that.
         if np.max(np.abs(deviation)) > 1e-6:
             notes.append("different ground motions were commanded")
     if str(first.controller.get("mode")) == "mil":

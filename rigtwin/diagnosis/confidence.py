@@ -112,6 +112,7 @@ def _corrects_form(share: float, expected: float, remains: float, clean: float) 
     left with it, `expected` the deviation of a law's form, and `clean` the ratio of both shares at
     which an effect explains its part cleanly.
     """
+    # An effect that returns nothing is surely small, and must not divide by zero.
     share = max(share, 1e-9)
     small = _logistic(expected / share, FORM_STEEPNESS)
     return small * _logistic(clean * remains / share)

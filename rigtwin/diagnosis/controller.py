@@ -238,6 +238,8 @@ class ControllerReplay:
             else:
                 best, value = min((misfit(choice), float(choice)) for choice in meaning)
                 trials.append((best, Deviation("setting", name, nominal, value, "1")))
+        # An inexact description never replays exactly, so there a setting must only come much
+        # closer.
         enough = 1.0 if self._control.exact is None else max(1.0, CLOSER * nominal_misfit)
         return min(
             (trial for trial in trials if trial[0] <= enough and self._reproduces(trial[1])),

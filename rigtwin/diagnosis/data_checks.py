@@ -335,6 +335,8 @@ def _check_order(machine: Machine, recording: Recording, predicted: Array) -> It
 
         orders = list(permutations(names))
         least = min(total(order) for order in orders)
+        # The size of the signals is the reference: an order that leaves more than half of it is no
+        # explanation.
         swings = [np.std(recording.column(*row.channel)) for _, row in rows]
         size = float(np.linalg.norm(swings))
         # A defect may make a wrong order fit slightly better. An exchange must fit three times as

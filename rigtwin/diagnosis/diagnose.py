@@ -9,6 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 from threadpoolctl import threadpool_limits
 
@@ -160,29 +161,41 @@ def diagnose(
             return Diagnosis(unusable, machine, None, configurations[0])
         judging_configurations = _configure_held_out(machine, held_out, base)
         notes += _contact_notes(machine, recordings)
+        fitted, judging = (recordings, configurations), (held_out, judging_configurations)
+        evidence_of = partial(_gather_evidence, fitted=fitted, judging=judging)
 
-        def evidence_of(part: Machine) -> tuple[Evidence, Evidence | None]:
-            judging = Evidence(part, held_out, judging_configurations) if held_out else None
-            return Evidence(part, recordings, configurations), judging
+        diagnosis = _diagnose_parts(
+            machine, evidence_of, tests, progress, first_look, thresholds, started
+        )
+        return _with_notes(diagnosis, notes)
 
-        def diagnose_part(part: Machine) -> Diagnosis:
-            return _diagnose_part(
-                *evidence_of(part), tests, progress, first_look, thresholds, started
-            )
 
-        return _with_notes(_diagnose_parts(machine, evidence_of, diagnose_part, started), notes)
+def _gather_evidence(
+    part: Machine,
+    fitted: tuple[list[Recording], list[Configuration]],
+    judging: tuple[list[Recording], list[Configuration]],
+) -> tuple[Evidence, Evidence | None]:
+    """Evidence of a part of a machine, and that of the held-out recordings if there are any."""
+    held_out = Evidence(part, *judging) if judging[0] else None
+    return Evidence(part, *fitted), held_out
 
 
 def _diagnose_parts(
     machine: Machine,
     evidence_of: Callable[[Machine], tuple[Evidence, Evidence | None]],
-    diagnose_part: Callable[[Machine], Diagnosis],
+    tests: Sequence[Experiment],
+    progress: Callable[[str, int], object],
+    first_look: Callable[[FirstLook], object],
+    thresholds: Thresholds,
     started: float,
 ) -> Diagnosis:
     """Diagnose the independent parts of a machine, and join their answers."""
     # Joints that do not act on each other are diagnosed one by one: their effects cannot be
     # confounded, and the search is much smaller.
-    parts = [diagnose_part(part) for part in machine.physics.split(machine)]
+    parts = [
+        _diagnose_part(*evidence_of(part), tests, progress, first_look, thresholds, started)
+        for part in machine.physics.split(machine)
+    ]
     # Joining needs evidence of the whole machine, which costs further predictions.
     return parts[0] if len(parts) == 1 else join(*evidence_of(machine), parts, started)
 

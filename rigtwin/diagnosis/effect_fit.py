@@ -93,6 +93,7 @@ class EffectFit:
     def correlation(self) -> Array:
         """Correlation of the values, shape (parameters, parameters)."""
         deviations = np.sqrt(np.maximum(np.diag(self.covariance), 1e-300))
+        # A fixed value has no deviation; the smallest number keeps its correlations finite.
         return self.covariance / np.outer(deviations, deviations)
 
     def overlays(self) -> tuple[Overlay, ...]:

@@ -132,6 +132,7 @@ class Fitter:
             forces = [
                 measured[n] for n, row in enumerate(self.evidence.machine.rows) if row.kind in JUMPS
             ]
+            # A machine without a measured force or command has none to scale by.
             force = max((float(np.sqrt(np.mean(column**2))) for column in forces), default=0.0)
             motion = self.evidence.models[longest].motion(component, self.plant)
             period = self.evidence.lines[longest].period

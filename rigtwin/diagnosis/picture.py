@@ -141,6 +141,7 @@ def compare_size(view: View) -> str:
     dᵀ(measured - before) / dᵀd; 1 if the recording agrees with the fit.
     """
     response = (view.after - view.before)[view.counted]
+    # The regression has no constant: an effect without response says nothing about an offset.
     power = float(response @ response)
     if power <= 0.0:
         return ""

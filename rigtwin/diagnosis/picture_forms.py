@@ -190,6 +190,7 @@ def _line(view: View) -> Picture:
     x, y, z = view.before[counted], view.measured[counted], view.after[counted]
     every = max(1, math.ceil(len(x) / POINTS))
     x, y, z = x[::every], y[::every], z[::every]
+    # The dashed line is the diagonal: a prediction against itself.
     order = np.argsort(x)
     ends = np.array([x.min(), x.max()])
     curves = [

@@ -272,6 +272,8 @@ class HypothesisPosterior:
             exchanged = members - common
             if hypothesis.weight < least or len(exchanged) != 1:
                 continue
+            # Exactly one effect beside the common ones: the hypothesis exchanges the effect and
+            # adds none.
             (candidate,) = exchanged
             if candidate != effect and common <= members:
                 rivals.append(candidate)

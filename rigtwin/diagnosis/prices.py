@@ -144,6 +144,7 @@ class Prices:
         for first in range(len(absent)):
             for second in range(first):
                 if absent[first] and absent[second]:
+                    # 1 for effects that do not oppose each other, and 0 for two that cancel.
                     joint = scored.together[first, second]
                     # The price rises linearly from the threshold to its half.
                     lacking = (t.cancelling_share - joint) / (0.5 * t.cancelling_share)

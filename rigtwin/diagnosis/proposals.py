@@ -244,6 +244,8 @@ def _resemble(
     projected = space.project_out(both)
     shapes, target = projected[:, :-1], projected[:, -1]
     along, power = shapes.T @ target, np.maximum(np.sum(shapes**2, axis=0), 1e-100)
+    # The sign is kept until the square is taken: an opposed response has no start that imitates the
+    # other.
     cosines = np.maximum(along, 0.0) ** 2 / (power * float(target @ target) + 1e-300)
     best = int(np.argmax(cosines))
     share = min(float(along[best] / power[best]), LARGEST_SHARE)

@@ -67,6 +67,7 @@ def read_signals(evidence: Evidence, plant: Plant, thresholds: Thresholds) -> Si
         if deviation.kind in ("setting", "unknown")
         and deviation.consequence < thresholds.controller_consequence
     )
+    # The nominal properties are those of the described plant, of which the search changes none.
     sampled = find_outstanding(
         evidence.machine, evidence.recordings, evidence.predict(plant), evidence.plant
     )

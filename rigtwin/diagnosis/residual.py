@@ -74,6 +74,8 @@ def combine_residuals(
     # Root mean square of the ratios: in units of their noise floors, outputs of different units
     # add.
     ratio = math.hypot(*(output.ratio for output in outputs.values())) / math.sqrt(len(outputs))
+    # The band is that of the output with the largest ratio, since spectra of different units cannot
+    # be added.
     loudest = max(outputs, key=lambda name: outputs[name].ratio)
     return Residual(ratio, 1.0, ratio, "1", band(differences[loudest], period), outputs)
 

@@ -231,6 +231,7 @@ class Scorer:
     def _rest(self, products: Array, expected: Array) -> Array:
         """Return each signal's residual beyond noise and declared error, as a share of all
         signals' amplitude."""
+        # The last row and column of the products is the residual's own power.
         beyond = products[..., -1, -1].sum(axis=(0, 2, 3)) - expected.sum(axis=(0, 2, 3))
         return np.asarray(np.sqrt(np.maximum(beyond, 0.0) / self._signal_power))
 
@@ -312,6 +313,8 @@ def _cross_validate(
     if count:
         blocks, slopes = normal.sum(axis=(1, 2)), gradient.sum(axis=(1, 2))
         whole, right = blocks.sum(axis=(0, 1)), slopes.sum(axis=(0, 1))
+        # A parameter without response, or with none in the remaining blocks, would make the matrix
+        # singular.
         ridge = np.diag(prior + RIDGE * np.diag(whole) + 1e-12)
         # The move that all data ask for is subtracted from that of each fold. It is not 0 where the
         # residual is discontinuous, as at a stick: such a fit is no stationary point of its

@@ -276,6 +276,8 @@ class HypothesisSearch:
         # The closest fit is a leader even if its effects are not worth their price yet: the next
         # effect may make them so.
         closest = sorted(near, key=lambda fit: fit.misfit)
+        # The order is that in which they are tried: the best, the closest, further ones, and one
+        # with dry friction.
         leaders = (ranked[0], *closest[:1], *near[: self.thresholds.leaders], *dry[:1])
         for fit in leaders:
             if frozenset(fit.effects) not in self._extended:

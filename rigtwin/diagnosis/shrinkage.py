@@ -226,6 +226,7 @@ def shrinkage(before: float, after: float, floor: float = 1.0) -> float:
     float
         At most 1; negative if the gap grows.
     """
+    # Powers add and amplitudes do not, so the floor is subtracted before the root is taken.
     gap = math.sqrt(max(before - floor, 0.0))
     remainder = math.sqrt(max(after - floor, 0.0))
     return 1.0 - remainder / gap if gap > 0.0 else 0.0
@@ -249,6 +250,7 @@ def interval(residual: Blocks) -> Interval:
         return Interval(0.0, 0.0, 0.0)
     # The seed is fixed: the same recordings give the same answer.
     random = np.random.default_rng(SEED)
+    # Drawn with replacement, as many blocks as there are.
     drawn = random.integers(0, count, (DRAWS, count))
     # Both residuals are drawn by the same blocks. What raises both, such as a fast part of the
     # motion, then cancels in their ratio.

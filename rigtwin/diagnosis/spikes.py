@@ -38,6 +38,7 @@ def despike(signal: Array, height: float) -> None:
     for tick in range(3, ticks - 3):
         if close[tick] >= 3:
             continue
+        # The median is that of the original samples, so a replaced neighbour does not count.
         window[:] = original[tick - 3 : tick + 4]
         # Insertion sort of seven values: np.median would allocate at every tick.
         for place in range(1, 7):

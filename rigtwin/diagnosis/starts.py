@@ -64,6 +64,8 @@ def start_in_series(
     starts = []
     gates = [effect for effect in candidates if effect.kind.name == GATEWAY and effect.of is Guide]
     for gate in gates:
+        # Pairs of the three: friction with a spring, friction with a play, and a play with a
+        # spring.
         series = [gate] + [
             effect
             for effect in candidates

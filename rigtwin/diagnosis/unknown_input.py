@@ -211,6 +211,7 @@ def _use_tolerances(
 
 def _fit_component(disturbance: _Disturbance, space: Space, rounds: int) -> DisturbanceFit:
     without, misfit, worth = disturbance.fit(space, rounds)
+    # Forms of one name may enter twice, as sine and cosine, and count once.
     order = np.argsort(-worth)
     forms = tuple(
         dict.fromkeys(disturbance.names[form] for form in order[:3] if worth[form] > PRICE)

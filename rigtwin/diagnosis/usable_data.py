@@ -61,6 +61,7 @@ def _answer_faults(
         for fault in find_faults(machine, recording, configuration, least_ticks(recordings))
         if fault.fatal
     ]
+    # A set may consist of short recordings; together they must be as long as a single one.
     total = sum(recording.ticks for recording in recordings)
     if len(recordings) > 1 and total < SHORTEST:
         faults.insert(
