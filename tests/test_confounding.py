@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 import rigtwin
+from rigtwin.diagnosis.confounded_text import describe_confounded
 from rigtwin.diagnosis.finding import Confounded, Name
-from rigtwin.diagnosis.text import _describe_confounded
 from tests.test_servo import ONE, machine_in, model_text, recorded
 
 WEIGHTLESS = '<option gravity="0 0 0"'
@@ -70,5 +70,5 @@ def test_a_mass_that_gravity_shows_is_not_confounded(tmp_path: Path) -> None:
 )
 def test_a_dependence_is_told_in_words(power: float, words: str) -> None:
     entry = Confounded(Name("bob", "mass"), 3.45, "kg", ((Name("pivot", "coulomb"), power),))
-    text = _describe_confounded(entry)
+    text = describe_confounded(entry)
     assert text == f"these values hold if mass@bob is 3.45 kg, which the data do not show: {words}"

@@ -15,13 +15,14 @@ from rigtwin.components import Motion, RigPlant, find
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.effects import without_effect
 from rigtwin.diagnosis.controller import ControllerReplay, Deviation
-from rigtwin.diagnosis.cross_validation import Blocks, interval, reject_worsening, shrinkage
+from rigtwin.diagnosis.cross_validation import reject_worsening
 from rigtwin.diagnosis.fit import with_values
 from rigtwin.diagnosis.fitter import Fitter
 from rigtwin.diagnosis.localisation import region
 from rigtwin.diagnosis.next_test import propose_test
 from rigtwin.diagnosis.result import Diagnosis
 from rigtwin.diagnosis.sampling import find_outstanding
+from rigtwin.diagnosis.shrinkage import Blocks, interval, shrinkage
 from rigtwin.diagnosis.unknown_input import locate_disturbance
 from rigtwin.errors import RigtwinError
 from rigtwin.recording import Recording

@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 
 from rigtwin.components import KINDS, RigPlant
-from rigtwin.diagnosis.evidence import Evidence, despike
+from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.explain import candidates, explain
 from rigtwin.diagnosis.fit import with_values
 from rigtwin.diagnosis.fitter import Fitter
 from rigtwin.diagnosis.linearised import Linearised
 from rigtwin.diagnosis.space import BOUND, Space
+from rigtwin.diagnosis.spikes import despike
 from tests.helpers.twin import RIG, evidence_of, recorded, rig_effect
 
 DIRECT = {"hum", "noise", "quantisation", "missed_ticks"}

@@ -12,7 +12,9 @@ from rigtwin.components.library import KINDS
 from rigtwin.diagnosis.figures import thin
 from rigtwin.diagnosis.finding import Estimate, Finding, Name
 from rigtwin.diagnosis.overlay import Overlay, overlay
-from rigtwin.diagnosis.pictures import FORMS, PICTURES, Picture, picture, without_effect
+from rigtwin.diagnosis.picture import Picture
+from rigtwin.diagnosis.picture_forms import FORMS
+from rigtwin.diagnosis.pictures import PICTURES, picture, without_effect
 from rigtwin.diagnosis.units import find_unit, say
 from tests.helpers.twin import RIG, evidence_of, recorded, rig_effect
 

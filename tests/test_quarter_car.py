@@ -10,8 +10,8 @@ from experiments import EXPERIMENTS
 from rigtwin.components import Effect, RigPlant, Scales, Swing, candidates
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.settings import Safety
-from rigtwin.diagnosis.evidence import despike
 from rigtwin.diagnosis.fit import with_values
+from rigtwin.diagnosis.spikes import despike
 from rigtwin.diagnosis.swing import swings
 from rigtwin.models.quarter_car import Disturbances, QuarterCarModel
 from rigtwin.models.quarter_car_step import motor_friction, solve_velocity

@@ -13,8 +13,8 @@ from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Machine
 from rigtwin.diagnosis.copies import drop_copies, refuse_copies
 from rigtwin.diagnosis.data_checks import require_fit
+from rigtwin.diagnosis.effect_fit import EffectFit as EffectFit
 from rigtwin.diagnosis.evidence import Evidence
-from rigtwin.diagnosis.known_effects import EffectFit as EffectFit
 from rigtwin.diagnosis.known_effects import find_effects, fit_effects
 from rigtwin.diagnosis.short_recordings import drop_short, least_ticks
 from rigtwin.errors import RigtwinError

@@ -41,6 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def execute(parsed: argparse.Namespace) -> int:
+    from rigtwin.components.plant import parameter_of
     from rigtwin.description.catalogue import shipped
     from rigtwin.description.document import examine
 
@@ -65,9 +66,8 @@ def execute(parsed: argparse.Namespace) -> int:
     for name, component in machine.components.items():
         # Tolerances in ticks have no unit of their own to print beside a value.
         held = [t for t in machine.tolerances if t.group == name and not t.ticks]
-        part = getattr(machine.plant, name)
         values = ", ".join(
-            f"{t.parameter} {getattr(part, t.parameter):g} ± "
+            f"{t.parameter} {parameter_of(machine.plant, name, t.parameter):g} ± "
             + (f"{100 * t.half_width:g} %" if t.relative else f"{t.half_width:g}")
             for t in held
         )

@@ -35,10 +35,14 @@ def advise(answer: Answer) -> tuple[str, ...]:
             else ""
         )
         return (f"Nothing needs to be corrected: use the twin as it is{invisible}.",)
+    # This is the answer to a standstill (`_answer_standstill`): there was nothing to fit, so it has
+    # neither a gap nor places.
     if answer.verdict == "unknown" and answer.gap is None and not answer.where:
         return (
             "Push harder, or look whether the joint is free: where nothing moves, nothing shows.",
         )
+    # Saving the twin comes first only where nothing remains to be found. Otherwise it is a stopgap,
+    # and the last step.
     steps = [SAVE_TWIN] if answer.verdict == "explained" else []
     steps += _separate_rivals(answer)
     if doubtful := [effect for effect in answer.effects if effect.confidence < CONFIDENT]:
@@ -50,6 +54,8 @@ def advise(answer: Answer) -> tuple[str, ...]:
         )
     if answer.verdict != "explained":
         steps += _locate_residual(answer)
+    # `Gap.held_out` is a description from `cross_validation`: "blocks left out of the fit in turn",
+    # or "2 held-out recordings".
     elif answer.gap is not None and "held-out" not in answer.gap.held_out:
         steps.append(
             "Pass another recording of the machine with `--held-out` to test whether the "

@@ -43,6 +43,8 @@ def balance_forces(fitter: Fitter, effects: Sequence[Effect]) -> Values | None:
     if missing is None:
         return None
     nominal = np.array([effect.nominal(plant)[effect.kind.parameters[0]] for effect in effects])
+    # The difference quotient is taken over a whole start of a search and not over a small step: the
+    # force is linear in the effect, and a large change is less disturbed by rounding.
     trial = np.array([fitter.starts(effect).values[0][0] for effect in effects])
     columns = np.empty((len(missing), len(effects)))
     for number, effect in enumerate(effects):
@@ -52,7 +54,10 @@ def balance_forces(fitter: Fitter, effects: Sequence[Effect]) -> Values | None:
         columns[:, number] = changed - missing
     if not (np.isfinite(columns).all() and np.isfinite(missing).all()):
         return None
+    # Columns are collinear where two effects cause proportional forces. `lstsq` then returns the
+    # solution of least norm, where a solver of normal equations would fail.
     shares = np.linalg.lstsq(columns, -missing, rcond=None)[0]
     low, high = fitter.bounds(effects)
+    # The solution is linear and may leave the physical range; a fit starts within it.
     magnitudes = np.clip(nominal + shares * (trial - nominal), low, high)
     return tuple((float(value),) for value in magnitudes)

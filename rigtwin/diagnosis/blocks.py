@@ -46,6 +46,8 @@ def split_transforms(evidence: Evidence, vector: Array) -> list[NDArray[np.compl
     """
     spectra, place = [], 0
     for lines in evidence.lines:
+        # `Evidence.whiten` writes the real parts of all lines of a recording before the imaginary
+        # ones.
         size = lines.weight.size
         real, imaginary = vector[place : place + size], vector[place + size : place + 2 * size]
         spectra.append((real + 1j * imaginary).reshape(lines.weight.shape))
@@ -71,7 +73,10 @@ def find_bands(lines: int, even: float) -> list[slice]:
     """
     if even == 1.0:
         return [slice(0, lines)]
+    # The width doubles from band to band, as on a logarithmic axis of frequency.
     edges, width = [0], NARROWEST
+    # A band ends only where the next one, twice as wide, is complete. The last band takes the rest,
+    # so that no band at the top is nearly empty.
     while edges[-1] + 3 * width <= lines:
         edges.append(edges[-1] + width)
         width *= 2
@@ -136,6 +141,8 @@ def count_independent(evidence: Evidence, residual: Array) -> Array:
             most = 2.0 * np.count_nonzero(power[:, band], axis=1)
             by_band.append(np.minimum(4.0 * total**2 / np.maximum(squared, TINY), most))
         counts.append(np.stack(by_band, axis=1))
+    # Bands that a recording lacks get this floor too. `Scorer` limits the count to the number of
+    # samples, which is 0 there.
     return np.maximum(align(counts), float(FEWEST * BLOCKS))
 
 
@@ -180,6 +187,7 @@ def excess_by_band(evidence: Evidence, fit: Fit) -> Array:
         if excess is None:
             averages.append(np.zeros((lines.weight.shape[0], len(bands))))
             continue
+        # Excluded lines (the mains) have no weight, so their excess is 0 and would dilute a mean.
         counted = lines.weight > 0.0
         by_band = [
             np.sum(excess[:, band], axis=1) / np.maximum(np.sum(counted[:, band], axis=1), 1)
@@ -209,6 +217,8 @@ def block_products(evidence: Evidence, stack: Array) -> tuple[Array, Array]:
     products, expected = [], []
     for number, lines in enumerate(evidence.lines):
         columns = np.stack([spectrum[number] for spectrum in spectra])
+        # By the weights' definition real and imaginary part of a counted line have unit variance
+        # each.
         noise = 2.0 * (lines.weight > 0.0)
         by_band, powers = [], []
         for band in find_bands(columns.shape[2], evidence.machine.prior.even):

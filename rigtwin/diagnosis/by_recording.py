@@ -19,9 +19,10 @@ from itertools import pairwise
 import numpy as np
 
 from rigtwin.components import Effect
-from rigtwin.components.plant import Plant
-from rigtwin.diagnosis.evidence import JUMPS, SPIKE, Evidence, despike
+from rigtwin.components.plant import Plant, parameter_of, with_parameters
+from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.space import PRIOR
+from rigtwin.diagnosis.spikes import JUMPS, SPIKE, despike
 from rigtwin.numerics.arrays import Array
 
 BLOCKS = 10
@@ -62,17 +63,15 @@ class FreeParameter:
 
     def value_in(self, plant: Plant) -> float:
         """Return the parameter's value in a plant, SI."""
-        return float(getattr(getattr(plant, self.group), self.parameter))
+        return parameter_of(plant, self.group, self.parameter)
 
     def shift(self, plant: Plant, steps: float) -> Plant:
         """Return a plant with this parameter raised by a number of steps, within its bounds."""
-        part = getattr(plant, self.group)
         value = self.value_in(plant) + steps * self.step
         if self.effect is not None:
             quantity = self.effect.quantities()[self.parameter]
             value = min(max(value, quantity.low), quantity.high)
-        changed = part._replace(**{self.parameter: value, **dict(self.companions)})
-        return plant._replace(**{self.group: changed})
+        return with_parameters(plant, self.group, {self.parameter: value, **dict(self.companions)})
 
 
 @dataclass(frozen=True)
@@ -181,6 +180,9 @@ class ByRecording:
         for whole in self.normal.sum(axis=1):
             response = whole[number, number]
             inner = whole[np.ix_(rest, rest)] + self._prior(rest, whole)
+            # b' A^-1 b is the part of the response's power that the nuisances imitate within their
+            # priors. The visible share is 1 - R², with the multiple correlation R of the response
+            # and theirs.
             imitated = whole[rest, number] @ np.linalg.solve(inner, whole[rest, number])
             shares.append(max(response - imitated, 0.0) / response if response > 0.0 else 0.0)
         return np.array(shares)
@@ -217,6 +219,8 @@ class ByRecording:
         formal = []
         for number, (inner, _, _) in enumerate(parts):
             share = float(self.power[number].sum())
+            # The tested column is the last one, and the nuisances are eliminated. The common
+            # parameters count as known here; their part of the error is in the jackknife.
             information = max(inner[-1, -1], 1e-300)
             formal.append(
                 share * misfit / max(self.total, 1e-300) / self.pieces[number] / information
@@ -274,6 +278,7 @@ class ByRecording:
         The Schur complement N_cc - N_cn N_nn^-1 N_nc is the information on the columns when the
         nuisances are free.
         """
+        # The minimum over t of t' N t - 2 g' t is -g' N^-1 g: by so much the nuisances lower χ².
         inner = whole[np.ix_(nuisances, nuisances)] + self._prior(nuisances, whole)
         cross = whole[np.ix_(nuisances, columns)]
         solved = np.linalg.solve(inner, np.column_stack([cross, right[nuisances]]))
@@ -362,6 +367,8 @@ def _equations(
     """Normal matrix, gradient and power of each block, and the number of independent samples."""
     lines = evidence.lines[number]
     forms = np.array([evidence.machine.form_of(row) for row in evidence.machine.rows])
+    # Noise and declared model error are independent, so their variances add. The error is declared
+    # as a share of the signal's standard deviation.
     scale = np.sqrt(lines.noise**2 + (forms * np.std(lines.measured, axis=1)) ** 2)
     weight = lines.fade / scale[:, None]
     residual = weight * differences_of(evidence, number, plant)
@@ -372,9 +379,15 @@ def _equations(
         # A step that a bound cuts short is taken to the other side instead.
         if abs(column.value_in(changed) - column.value_in(plant)) < 0.5 * abs(column.step):
             sign, changed = -1.0, column.shift(plant, -1.0)
+        # The residual is measured minus predicted, so e(θ) - e(θ + step) is the response of the
+        # prediction. Solving JᵀJ θ = Jᵀe then needs no minus sign.
         jacobian.append(sign * (residual - weight * differences_of(evidence, number, changed)))
+    # With a relative unit every recording has a χ² of 1 per sample at its own plant. A recording
+    # that the model fits badly then does not outvote the others.
     unit = max(float(np.sqrt(np.mean(residual**2))), 1e-300) if relative else 1.0
     flat = np.stack([*jacobian, residual]) / unit
+    # Blocks much longer than the correlation of the residual are nearly independent, which the
+    # jackknife requires.
     cuts = np.linspace(0, flat.shape[2], BLOCKS + 1).astype(int)
     # One product per block holds JᵀJ, Jᵀe and eᵀe: the residual is its last row and column.
     products = np.stack(

@@ -92,6 +92,8 @@ def _posterior(diagnosis: Diagnosis) -> Posterior:
         if effect.name.kind not in ("setting", "unknown")
         for name, estimate in effect.parameters.items()
     }
+    # The corrected twin needs all its corrections at once, so it is as certain as the least certain
+    # one.
     confidence = min(effect.confidence for effect in diagnosis.effects)
     return Posterior(
         {},
@@ -103,6 +105,7 @@ def _posterior(diagnosis: Diagnosis) -> Posterior:
 
 def _alternative(fit: Fit, probability: float) -> Alternative:
     """Other explanation as changes of the plant, by component."""
+    # Two effects of one component share its table.
     changes: dict[str, dict[str, object]] = {}
     for effect, values in zip(fit.effects, fit.values, strict=True):
         changes.setdefault(effect.group, {}).update(

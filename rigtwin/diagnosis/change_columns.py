@@ -116,7 +116,5 @@ def sensors_of(machine: Machine) -> list[str]:
     return [
         name
         for name, component in machine.components.items()
-        if component.channel is not None
-        and measures(part := getattr(machine.plant, name, None))
-        and hasattr(part, "offset")
+        if component.channel is not None and component.quantity
     ]

@@ -169,6 +169,8 @@ class ChangeSearch:
         self._named = [effect for effect in searched if effect.name in named]
         candidates = [effect for effect in searched if effect not in self._named]
         self.columns = list_parameters(self._fitter, self._named, candidates, self.plant)
+        # All recordings start from one plant. Their plants part when a change is accepted
+        # (`compare`).
         self._linearise([self.plant] * self.count)
         self.pieces = float(self._equations.pieces.sum())
         self._common = [n for n, c in enumerate(self.columns) if c.effect in self._named]
@@ -194,6 +196,8 @@ class ChangeSearch:
             estimate = self._equations.estimate(number, self._common, nuisances)
             test = check_homogeneity(estimate.moves, estimate.widths, FREEDOM)
             if test.probability < self.thresholds.change_probability:
+                # Only differences of a zero are known here. Its mean over all recordings may be an
+                # effect, which the joint diagnosis fits.
                 moves = (estimate.moves - test.mean) * self.columns[number].step
                 differing[self.columns[number].group] = moves
         return differing
@@ -228,6 +232,8 @@ class ChangeSearch:
             ]
             changes.append(self._describe(best.tested, best.values, alternatives))
             changed.append(best.tested.number)
+            # From here on the change is a nuisance, so that no later test explains the same
+            # difference again.
             free.append(best.tested.number)
             misfit = best.misfit
             self._linearise(best.plants)
@@ -247,6 +253,8 @@ class ChangeSearch:
                 continue
             nuisances = [n for n in (*self._common, *self._nuisances) if n != number]
             shares = self._equations.visible_share(number, nuisances)
+            # One recording that does not show the parameter spoils a comparison, so the smallest
+            # share counts.
             (invisible if np.min(shares) < self.thresholds.observable_share else visible).append(
                 number
             )
@@ -327,6 +335,8 @@ class ChangeSearch:
         if rival is best:
             return False
         ratio = rival.misfit / max(best.misfit, 1e-300)
+        # A rough model's error changes with any parameter, so there a rival may also be worse by as
+        # much as a change has to gain.
         margin = 0.0 if self._settled else self.thresholds.change_log_error
         pieces = float(self._equations.pieces.sum())
         return (
@@ -385,6 +395,8 @@ class ChangeSearch:
         """
         number = test.number
         shared = [n for n in self._common if n != number and n not in free]
+        # The order is that of the steps in `_shift_plant`: the tested parameter, then the common
+        # ones. The nuisances after them stay at the plant's values.
         chosen = [self.columns[n] for n in (number, *shared, *free)]
         common = range(1, 1 + len(shared))
         nuisances = range(1 + len(shared), len(chosen))
@@ -411,8 +423,12 @@ class ChangeSearch:
         homogeneity = check_homogeneity(values, last.widths * abs(chosen[0].step), FREEDOM)
         refined = replace(
             test,
+            # The moves of the linear test are kept, but not used: `_describe` gets the fitted
+            # values.
             estimate=replace(test.estimate, widths=last.widths),
             statistic=homogeneity.statistic,
+            # Bonferroni's correction and not Holm's: Holm needs the probabilities of all
+            # candidates, and only a few were fitted.
             probability=min(count * homogeneity.probability, 1.0),
         )
         return _FittedParameter(refined, values, misfit, tuple(plants))
@@ -420,6 +436,8 @@ class ChangeSearch:
     def _misfit(self, plants: Sequence[Plant]) -> float:
         """χ² that plants leave after zeros and tolerances are fitted."""
         nuisances = [self.columns[n] for n in self._nuisances]
+        # Misfits of different plants are compared, so they need a common unit: noise and declared
+        # error.
         equations = ByRecording.at(self.evidence, plants, nuisances, relative=False)
         return equations.estimate(None, (), range(len(nuisances))).misfit
 

@@ -72,10 +72,7 @@ def find_changes(
         aligned, zeros, search = _align_zeros(
             machine, recordings, diagnose_set, progress, thresholds
         )
-        model = search.compare()
-        has_change = any(parameter.verdict == "changed" for parameter in model.parameters)
-        if has_change or search.together.verdict not in ("no gap", "explained"):
-            model = _restart(model, search, (aligned[0], aligned[-1]), diagnose_set, thresholds)
+        model = _find_best_model(search, aligned, diagnose_set, thresholds)
     covariates = _covariates(search.evidence)
     # Trends are fitted last: they describe a change, and do not decide whether there is one.
     parameters = tuple(
@@ -109,6 +106,8 @@ def _align_zeros(
     aligned = list(recordings)
     search = ChangeSearch(diagnose_set(aligned), thresholds)
     progress("comparing recordings", 1)
+    # A sensor may be zeroed anew between two tests. One plant for all recordings has one zero, so
+    # the difference would bias every effect that the joint diagnosis fits.
     differing = search.differing_zeros()
     if differing:
         aligned = [
@@ -125,6 +124,21 @@ def _align_zeros(
         if values.any()
     }
     return aligned, zeros, search
+
+
+def _find_best_model(
+    search: ChangeSearch,
+    aligned: Sequence[Recording],
+    diagnose_set: Callable[[Sequence[Recording]], Diagnosis],
+    thresholds: Thresholds,
+) -> ChangeModel:
+    """Search for changes, and once more from the first and the last recording if that may help."""
+    model = search.compare()
+    has_change = any(parameter.verdict == "changed" for parameter in model.parameters)
+    # A restart costs two more diagnoses, so it is made only where there is something to explain.
+    if has_change or search.together.verdict not in ("no gap", "explained"):
+        return _restart(model, search, (aligned[0], aligned[-1]), diagnose_set, thresholds)
+    return model
 
 
 def _restart(
@@ -177,6 +191,7 @@ def _covariates(evidence: Evidence) -> dict[str, Array]:
         )
     )
     for topic, name in sorted(shared):
+        # Recordings have no type of channel for a temperature, so its name has to tell.
         if "temp" in name.lower():
             covariates[f"temperature ({topic}.{name})"] = np.array(
                 [float(np.mean(r.column(topic, name))) for r in evidence.recordings]
@@ -205,7 +220,11 @@ def _with_trends(
     half_widths = np.array([0.5 * (interval.high - interval.low) for interval in parameter.values])
     # The fit weighs by standard errors, `interval_half_width` to each side.
     trends = fit_trends(
-        values, half_widths / thresholds.interval_half_width, covariates, float(BLOCKS - 1)
+        # The standard errors come from a jackknife, with one degree of freedom less than blocks.
+        values,
+        half_widths / thresholds.interval_half_width,
+        covariates,
+        float(BLOCKS - 1),
     )
     rivals, named = name_trends(
         trends, len(values), thresholds.trend_share, thresholds.trend_margin

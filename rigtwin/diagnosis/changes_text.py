@@ -55,6 +55,7 @@ def describe_changes(changes: Changes) -> str:
 
 def _row(parameter: ComparedParameter, recordings: int) -> tuple[str, ...]:
     factor, unit = shorten(parameter.unit, *(interval.value for interval in parameter.values))
+    # All values of a row share the unit of its largest one.
     values = [
         f"{spell(factor * interval.value, 4)} ± "
         f"{spell(factor * 0.5 * (interval.high - interval.low), 2)}"

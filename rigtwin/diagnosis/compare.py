@@ -13,10 +13,10 @@ from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Machine
 from rigtwin.diagnosis.contacts import find_contacts
 from rigtwin.diagnosis.copies import digest
-from rigtwin.diagnosis.cross_validation import gap_level
 from rigtwin.diagnosis.data_checks import SHORTEST, require_fit
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.residual import Residual, compute_residual
+from rigtwin.diagnosis.shrinkage import gap_level
 from rigtwin.errors import RigtwinError
 from rigtwin.recording import Recording
 from rigtwin.signals.noise import remove_mains, white_noise
@@ -101,6 +101,8 @@ def _still_signals(evidence: Evidence) -> list[str]:
     still = [
         row.name
         for n, row in enumerate(evidence.machine.rows)
+        # A signal that should move and does not is a finding. Only one that is still in both is
+        # none.
         if max(np.std(lines.measured[n]), np.std(predicted[n])) < STILL * float(lines.noise[n])
         or np.ptp(evidence.recordings[0].column(*row.channel)) < NOTHING
     ]
@@ -151,6 +153,7 @@ def differences(first: Recording, second: Recording) -> tuple[str, ...]:
     notes = []
     if digest(first) == digest(second):
         notes.append("both hold the same data, so no difference says anything")
+    # Notes do not stop the comparison: two unlike tests may be compared on purpose.
     if first.experiment != second.experiment:
         notes.append(f"different experiments: {first.experiment} and {second.experiment}")
     settings = {*first.controller, *second.controller}
@@ -164,6 +167,7 @@ def differences(first: Recording, second: Recording) -> tuple[str, ...]:
         deviation = (
             first.column("/command", "ground")[:ticks] - second.column("/command", "ground")[:ticks]
         )
+        # Commands are the same up to the rounding of a file; a micrometre is far above that.
         if np.max(np.abs(deviation)) > 1e-6:
             notes.append("different ground motions were commanded")
     if str(first.controller.get("mode")) == "mil":
@@ -197,20 +201,8 @@ def compare_recordings(
         If a recording belongs to another machine, the periods differ, the common length is too
         short, or no sensor is in both.
     """
-    for recording in (first, second):
-        if recording.machine != machine.name:
-            raise RigtwinError(
-                f"{recording.path}: it is of machine {recording.machine!r}; "
-                f"expected {machine.name!r}"
-            )
-    if first.period != second.period:
-        raise RigtwinError(
-            f"periods differ: {first.path} has {first.period:g} "
-            f"s, {second.path} has {second.period:g} s"
-        )
+    _require_comparable(machine, first, second)
     ticks = min(first.ticks, second.ticks)
-    if ticks < SHORTEST:
-        raise RigtwinError(f"only {ticks} ticks in common; a comparison needs at least {SHORTEST}")
     results: dict[str, Residual] = {}
     still: list[str] = []
     sensors = [
@@ -226,6 +218,8 @@ def compare_recordings(
                 raise RigtwinError(
                     f"{topic}.{name} is not a number somewhere in {first.path} or {second.path}"
                 )
+            # The mains has another phase in every recording, so its line is in the difference even
+            # where the machine is the same.
             difference = remove_mains(before - after, first.period, machine.plant.mains.frequency)
             if np.ptp(before) == 0.0 and np.ptp(after) == 0.0:
                 still.append(sensor.name)
@@ -244,3 +238,21 @@ def compare_recordings(
             "stand still in both"
         )
     return results
+
+
+def _require_comparable(machine: Machine, first: Recording, second: Recording) -> None:
+    """Raise RigtwinError unless two recordings can be compared tick by tick."""
+    for recording in (first, second):
+        if recording.machine != machine.name:
+            raise RigtwinError(
+                f"{recording.path}: it is of machine {recording.machine!r}; "
+                f"expected {machine.name!r}"
+            )
+    if first.period != second.period:
+        raise RigtwinError(
+            f"periods differ: {first.path} has {first.period:g} "
+            f"s, {second.path} has {second.period:g} s"
+        )
+    ticks = min(first.ticks, second.ticks)
+    if ticks < SHORTEST:
+        raise RigtwinError(f"only {ticks} ticks in common; a comparison needs at least {SHORTEST}")

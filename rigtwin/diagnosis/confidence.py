@@ -69,10 +69,14 @@ def relative_rest(evidence: Evidence, plant: Plant) -> Array:
     """
     residual, swing = [], []
     for lines, predicted in zip(evidence.lines, evidence.predict(plant), strict=True):
+        # The state of the twin is unknown at the start of a recording, where no signal has weight
+        # yet.
         counted = lines.fade.max(axis=0) > 0.5
         residual.append(np.mean((lines.measured - predicted)[:, counted] ** 2, axis=1))
         swing.append(np.var(lines.measured[:, counted], axis=1))
     noise = np.mean([lines.noise**2 for lines in evidence.lines], axis=0)
+    # Powers of independent parts add, so the noise is subtracted as a power. By chance the residual
+    # may have less than its mean.
     beyond = np.maximum(np.mean(residual, axis=0) - noise, 0.0)
     return np.sqrt(beyond / np.maximum(np.mean(swing, axis=0), 1e-300))
 
@@ -90,6 +94,8 @@ def _share_of(effect: Effect, posterior: HypothesisPosterior) -> float:
     """
     gap = float(posterior.excess(posterior.empty).sum())
     remaining = {*posterior.best.fit.effects} - {effect}
+    # The ranking is sorted by cost and contains the empty hypothesis, so the first match is the
+    # best one and always exists.
     without = next(
         hypothesis.scored
         for hypothesis in posterior.ranking
@@ -106,6 +112,7 @@ def _corrects_form(share: float, expected: float, remains: float, clean: float) 
     left with it, `expected` the deviation of a law's form, and `clean` the ratio of both shares at
     which an effect explains its part cleanly.
     """
+    # An effect that returns nothing is surely small, and must not divide by zero.
     share = max(share, 1e-9)
     small = _logistic(expected / share, FORM_STEEPNESS)
     return small * _logistic(clean * remains / share)
@@ -154,5 +161,7 @@ def support_of(
         steadiness=effect.steadiness(best.fit.values[number], best.widths[number], evidence.plant),
         remains=remains,
         dominance=_dominance(best, number),
+        # Both rest on the share of the gap that remains. They are no independent reasons, so the
+        # larger one counts and not their product or sum.
         mimic=max(resembles, form),
     )

@@ -72,32 +72,50 @@ def find_confounded(
     base = searched.residual(fit.plant)
     responses = [_response(searched, fit, n, base) for n in range(len(fit.effects))]
     jacobian = np.column_stack(responses)
-    confounded = []
-    for effect in scaling:
-        space = Space(searched, fit.plant, effects=(*fit.effects, effect))
-        value = _declared(effect, searched)
-        changed = with_values(fit.plant, (effect,), ((value * (1.0 + STEP),),))
-        response = (searched.residual(changed) - base) / STEP
-        projected = space.project_out(np.column_stack([jacobian, response]))
-        columns, target = projected[:, :-1], projected[:, -1]
-        if float(target @ target) * CHANGE**2 < VISIBLE:
-            continue
-        exponents = -np.linalg.lstsq(columns, target, rcond=None)[0]
-        if not _undoes(columns, exponents, target) or np.abs(exponents).max() > STEEPEST:
-            continue
-        # Columns that resemble each other share an exponent; the simple law is told if it holds.
-        simple = np.clip(np.round(exponents), -1.0, 1.0)
-        exponents = simple if _undoes(columns, simple, target) else exponents
-        involved = tuple(
-            (Name(member.component, member.kind.name), float(exponent))
-            for member, exponent in zip(fit.effects, exponents, strict=True)
-            if member in named and abs(exponent) > INVOLVED
-        )
-        if involved:
-            unit = searched.machine.unit(effect.group, next(iter(effect.quantities().values())))
-            name = Name(effect.component, effect.kind.name)
-            confounded.append(Confounded(name, value, unit, involved))
-    return tuple(confounded)
+    entries = (_find_dependence(searched, fit, named, effect, jacobian, base) for effect in scaling)
+    return tuple(entry for entry in entries if entry is not None)
+
+
+def _find_dependence(
+    evidence: Evidence,
+    fit: Fit,
+    named: Sequence[Effect],
+    effect: Effect,
+    jacobian: Array,
+    base: Array,
+) -> Confounded | None:
+    """Return how fitted values depend on the declared value of an effect; None if they do not.
+
+    `jacobian` has the responses to relative changes of the fitted values, and `base` is the
+    residual of the fit.
+    """
+    # A tolerance of the declared value would absorb the very response that is studied; naming the
+    # effect fixes that tolerance.
+    space = Space(evidence, fit.plant, effects=(*fit.effects, effect))
+    value = _declared(effect, evidence)
+    changed = with_values(fit.plant, (effect,), ((value * (1.0 + STEP),),))
+    response = (evidence.residual(changed) - base) / STEP
+    projected = space.project_out(np.column_stack([jacobian, response]))
+    columns, target = projected[:, :-1], projected[:, -1]
+    # The response is per unit of relative change, and its χ² grows with the square of that change.
+    if float(target @ target) * CHANGE**2 < VISIBLE:
+        return None
+    # The least-squares solution e of target + columns e = 0, the module's equation.
+    exponents = -np.linalg.lstsq(columns, target, rcond=None)[0]
+    if not _undoes(columns, exponents, target) or np.abs(exponents).max() > STEEPEST:
+        return None
+    # Columns that resemble each other share an exponent; a simple law is reported if it holds.
+    simple = np.clip(np.round(exponents), -1.0, 1.0)
+    exponents = simple if _undoes(columns, simple, target) else exponents
+    involved = tuple(
+        (Name(member.component, member.kind.name), float(exponent))
+        for member, exponent in zip(fit.effects, exponents, strict=True)
+        if member in named and abs(exponent) > INVOLVED
+    )
+    if not involved:
+        return None
+    unit = evidence.machine.unit(effect.group, next(iter(effect.quantities().values())))
+    return Confounded(Name(effect.component, effect.kind.name), value, unit, involved)
 
 
 def _undoes(columns: Array, exponents: Array, target: Array) -> bool:

@@ -39,8 +39,10 @@ def find_contacts(machine: Machine, recording: Recording) -> list[str]:
     model = mechanism.model
     able = np.count_nonzero((model.geom_contype != 0) | (model.geom_conaffinity != 0))
     positions = machine.physics.joint_positions(machine, recording.columns, recording.period)
+    # Pairs that an MJCF lists explicitly collide whatever the geoms' contype and conaffinity.
     if (able < 2 and not model.npair) or not positions:
         return []
+    # Division rounded up, so that at most `POSES` poses are taken.
     every = -(-recording.ticks // POSES)
     ticks = np.arange(0, recording.ticks, every)
     touched = _pose(mechanism, positions, ticks)
@@ -64,6 +66,7 @@ def _pose(
     model, touched = mechanism.model, {}
     data = mujoco.MjData(model)
     place = {joint: int(model.jnt_qposadr[mechanism.number("joint", joint)]) for joint in positions}
+    # A joint tied to a measured one has no channel of its own, but moves its geoms.
     ties = [tie for tie in mechanism.ties_of(positions)[0] if tie.joint not in positions]
     led = [int(model.jnt_qposadr[mechanism.number("joint", tie.joint)]) for tie in ties]
     for tick in ticks.tolist():
@@ -79,6 +82,8 @@ def _pose(
         for pair in {
             (int(one), int(other))
             for (one, other), distance in zip(contacts.geom, contacts.dist, strict=True)
+            # MuJoCo lists a contact as soon as the distance is within the geoms' margin. Flexible
+            # bodies have the geom number -1.
             if distance < 0.0 and one >= 0 and other >= 0
         }:
             touched.setdefault(pair, []).append(tick)

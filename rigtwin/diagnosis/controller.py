@@ -54,7 +54,7 @@ class Deviation:
         `setting`, `missed_ticks` or `delay`; `unknown` if nothing reproduces the commands.
     name
         Name of the setting or of the parameter.
-    told
+    configured
         Value set by the operator, in `unit`.
     used
         Value that reproduces the commands, in `unit`.
@@ -66,7 +66,7 @@ class Deviation:
 
     kind: str
     name: str
-    told: float
+    configured: float
     used: float
     unit: str
     consequence: float = math.inf
@@ -133,6 +133,8 @@ class ControllerReplay:
         if skipped is None:
             return self._control.replay(settings, inputs, self._period)
         runs = np.nonzero(~skipped)[0]
+        # The controller does not know that ticks were missed: its filters see successive samples
+        # and the nominal period.
         executed = self._control.replay(settings, [column[runs] for column in inputs], self._period)
         # Each tick shows the outputs of the last executed tick; before the first one they are 0.
         last = np.searchsorted(runs, np.arange(len(skipped)), side="right") - 1
@@ -184,6 +186,8 @@ class ControllerReplay:
         shares = [
             (error / motion if motion > 0.0 else math.inf)
             for error, motion in zip(differs.tolist(), moves.tolist(), strict=True)
+            # A constant command has no motion to relate its error to: it is either reproduced, or
+            # off by an infinite share.
             if error > 0.0
         ]
         return max(shares, default=0.0)
@@ -193,6 +197,8 @@ class ControllerReplay:
 
         The controller may have run during the missed ticks, or not; both are tried.
         """
+        # A held output repeats to the last bit, which a controller with noisy inputs hardly ever
+        # does for all outputs at once.
         repeated = np.concatenate([[False], np.all(np.diff(self.recorded, axis=1) == 0.0, axis=0)])
         if not 0 < repeated.sum() < REPEATED * len(repeated):
             return None
@@ -232,6 +238,8 @@ class ControllerReplay:
             else:
                 best, value = min((misfit(choice), float(choice)) for choice in meaning)
                 trials.append((best, Deviation("setting", name, nominal, value, "1")))
+        # An inexact description never replays exactly, so there a setting must only come much
+        # closer.
         enough = 1.0 if self._control.exact is None else max(1.0, CLOSER * nominal_misfit)
         return min(
             (trial for trial in trials if trial[0] <= enough and self._reproduces(trial[1])),
@@ -259,18 +267,25 @@ def _minimise(
     """
     from scipy.optimize import minimize_scalar  # Imported here, as it loads slowly.
 
+    # A setting of 0 has no size of its own, so a hundredth of its upper bound stands for it, at
+    # most 0.01.
     size = max(abs(nominal), 0.01 * min(meaning.high, 1.0))
     # A setting may be 0, as the gain of a skyhook that is off, so that the grid is wide.
     grid = np.unique(np.clip(nominal + size * GRID, meaning.low, meaning.high))
     ends = misfit(grid[0]), misfit(grid[-1])
+    # Equality to the last bit is meant: a setting that acts at all changes the rounding.
     if len(grid) == 1 or ends[0] == ends[1] == misfit(grid[len(grid) // 2]):
         # The setting has no effect: it belongs to a part of the controller that is off.
         return ends[0], nominal
     values = [ends[0], *(misfit(value) for value in grid[1:-1]), ends[1]]
     place = int(np.argmin(values))
+    # The grid leaves the nominal value out, whose misfit is known to be too large. It still narrows
+    # the bracket of a minimum beside it.
     near = np.append(grid, nominal)
     low = near[near < grid[place]].max(initial=meaning.low)
     high = near[near > grid[place]].min(initial=meaning.high)
+    # Commands are stored with eight digits, so a setting must be found more precisely to replay
+    # them exactly.
     options = {"xatol": 1e-9 * size, "maxiter": 80}
     minimum = minimize_scalar(misfit, bounds=(low, high), method="bounded", options=options)
     return min((float(minimum.fun), float(minimum.x)), (values[place], float(grid[place])))

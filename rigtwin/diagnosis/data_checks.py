@@ -9,6 +9,7 @@ from itertools import permutations
 import numpy as np
 
 from rigtwin.components import Schedule
+from rigtwin.components.sensors import sensor_of
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import OWN, Machine, Row
 from rigtwin.diagnosis.dead_commands import dead_commands
@@ -108,6 +109,8 @@ def find_faults(
         Faults, the gravest first. Later checks are skipped where earlier faults make them
         meaningless.
     """
+    # Every check relies on the earlier ones: a missing channel cannot be read, a single NaN spoils
+    # all statistics, and a model driven by a dead command predicts nothing to compare with.
     faults = [*_check_presence(machine, recording, least)]
     if not faults:
         faults += _check_values(machine, recording)
@@ -148,7 +151,7 @@ def channels(machine: Machine) -> list[tuple[str, str]]:
     required += [
         component.channel
         for name, component in machine.components.items()
-        if component.channel is not None and isinstance(getattr(machine.plant, name), Schedule)
+        if component.channel is not None and component.component_type is Schedule
     ]
     if machine.control is not None:
         required += machine.control.channels
@@ -170,9 +173,13 @@ def _check_presence(machine: Machine, recording: Recording, least: int) -> Itera
         return
     for topic, name in channels(machine):
         if not recording.has(topic, name):
-            there = ", ".join(f"{t}.{n}" for t, fields in recording.columns.items() for n in fields)
+            recorded = ", ".join(
+                f"{t}.{n}" for t, fields in recording.columns.items() for n in fields
+            )
             yield Fault(
-                "missing", f"{topic}.{name}", f"channel {topic}.{name} is missing; it has {there}"
+                "missing",
+                f"{topic}.{name}",
+                f"channel {topic}.{name} is missing; it has {recorded}",
             )
     lasts = recording.ticks * recording.period
     if recording.ticks < least:
@@ -191,6 +198,7 @@ def _check_presence(machine: Machine, recording: Recording, least: int) -> Itera
 
 def _check_values(machine: Machine, recording: Recording) -> Iterator[Fault]:
     steps = np.diff(recording.time)
+    # Half a period tells the jitter of a clock from a lost tick.
     gaps = np.nonzero(np.abs(steps - recording.period) > 0.5 * recording.period)[0]
     if len(gaps):
         first = gaps[0]
@@ -209,6 +217,8 @@ def _check_values(machine: Machine, recording: Recording) -> Iterator[Fault]:
                 f"{where} is not a number at {recording.time[np.argmax(wrong)]:.3f} s",
             )
             continue
+        # Quantiles, because the damaged samples would inflate a standard deviation until they look
+        # usual.
         spread = float(np.subtract(*np.quantile(signal, [0.999, 0.001])))
         away = np.abs(signal - float(np.median(signal)))
         at = int(np.argmax(away))
@@ -245,7 +255,9 @@ def _check_alive(machine: Machine, recording: Recording, predicted: Array) -> It
             continue
         if component.element != "sensor":
             continue
-        bit = getattr(getattr(machine.plant, name), "resolution", 0.0)
+        bit = _declared_resolution(machine, name)
+        # A sensor that resolves its declared bit shows noise all the time. A coarser one may
+        # rightly repeat a value, for example while the machine rests.
         if bit > 0.0 and length >= STUCK and smallest_step(signal) <= COARSE * bit:
             since = f"for {length * recording.period:.3g} s from {recording.time[first]:.3f} s"
             yield Fault(
@@ -262,8 +274,15 @@ def _movers(machine: Machine) -> set[str]:
 
 def _is_at_rest(machine: Machine, row: Row, predicted: Array) -> bool:
     """Return whether a signal should stand still, because no command changes."""
-    bit = getattr(getattr(machine.plant, row.name, None), "resolution", 0.0)
-    return float(np.ptp(predicted)) <= bit
+    return float(np.ptp(predicted)) <= _declared_resolution(machine, row.name)
+
+
+def _declared_resolution(machine: Machine, name: str) -> float:
+    """Return the declared resolution of a sensor in its unit; 0 for a controller's command."""
+    component = machine.components.get(name)
+    if component is None or not component.quantity:
+        return 0.0
+    return sensor_of(machine.plant, name).resolution
 
 
 def _check_clipping(where: str, signal: Array) -> Iterator[Fault]:
@@ -289,6 +308,7 @@ def _check_inputs(
 
 def _check_order(machine: Machine, recording: Recording, predicted: Array) -> Iterator[Fault]:
     """Yield exchanged channels: another order of the sensors of one unit fits far better."""
+    # Sensors of different units cannot be exchanged unnoticed: their scales would be wrong.
     for unit in dict.fromkeys(row.unit for row in machine.rows if row.kind != "command"):
         rows = [
             (n, row)
@@ -298,23 +318,29 @@ def _check_order(machine: Machine, recording: Recording, predicted: Array) -> It
         if not 1 < len(rows) <= MOST_SWAPPED:
             continue
         names = [row.name for _, row in rows]
-        left = {}
+        misfits = {}
         for _, row in rows:
             for number, model in rows:
                 difference = recording.column(*row.channel) - predicted[number]
-                left[row.name, model.name] = rms(difference - np.mean(difference)) ** 2
+                misfits[row.name, model.name] = rms(difference - np.mean(difference)) ** 2
 
         def total(
             order: tuple[str, ...],
             names: list[str] = names,
-            left: dict[tuple[str, str], float] = left,
+            misfits: dict[tuple[str, str], float] = misfits,
         ) -> float:
-            return sum(left[name, model] for name, model in zip(names, order, strict=True)) ** 0.5
+            return (
+                sum(misfits[name, model] for name, model in zip(names, order, strict=True)) ** 0.5
+            )
 
         orders = list(permutations(names))
         least = min(total(order) for order in orders)
+        # The size of the signals is the reference: an order that leaves more than half of it is no
+        # explanation.
         swings = [np.std(recording.column(*row.channel)) for _, row in rows]
         size = float(np.linalg.norm(swings))
+        # A defect may make a wrong order fit slightly better. An exchange must fit three times as
+        # well, and explain most of the motion.
         if least < min(total(tuple(names)) / 3, EXCHANGED * size):
             # Orders that fit about as well differ in what these data cannot tell; the fewest swaps
             # are the likeliest.
@@ -342,12 +368,17 @@ def _check_scale(machine: Machine, recording: Recording, predicted: Array) -> It
         a, b = (signal, model) if whole else (signal - signal.mean(), model - model.mean())
         if rms(b) == 0.0 or rms(a) < MOVES * white_noise(signal) or not np.isfinite(b).all():
             continue
-        alike, slope = float(a @ b) / float(np.sqrt((a @ a) * (b @ b))), float(a @ b / (b @ b))
-        if alike < -CORRELATED:
+        correlation, slope = (
+            float(a @ b) / float(np.sqrt((a @ a) * (b @ b))),
+            float(a @ b / (b @ b)),
+        )
+        # `correlation` is that of signal and prediction, and `slope` the regression of the
+        # signal on the prediction: its scale.
+        if correlation < -CORRELATED:
             yield Fault(
                 "sign", where, f"{where} has the wrong sign: it goes against what is predicted"
             )
-        elif alike > CORRELATED:
+        elif correlation > CORRELATED:
             near = any(
                 abs(np.log(factor / slope)) < SAME_UNIT for factor, _ in UNITS.get(row.unit, ())
             )
@@ -355,6 +386,8 @@ def _check_scale(machine: Machine, recording: Recording, predicted: Array) -> It
                 odd[row] = slope
     for row, slope in _unexplained_scales(machine, recording, odd).items():
         known = UNITS.get(row.unit, ((1.0, ""),))
+        # Scales are compared by their logarithms: twice too large and twice too small are equally
+        # wrong.
         factor, guess = min(known, key=lambda pair: abs(np.log(pair[0] / slope)))
         as_if = f", as if in {guess}" if abs(np.log(factor / slope)) < NEAR_UNIT and guess else ""
         where = ".".join(row.channel)
@@ -376,12 +409,14 @@ def _unexplained_scales(
             # the diagnosis.
             del suspicious[row]
     for unit in {row.unit for row in odd}:
-        alike = [row for row in odd if row.unit == unit]
-        if len(alike) == 2 and len([row for row in machine.rows if row.unit == unit]) > 2:
-            one, other = (odd[row] for row in alike)
-            if 0.5 < one / other < 2.0:
+        same_unit = [row for row in odd if row.unit == unit]
+        if len(same_unit) == 2 and len([row for row in machine.rows if row.unit == unit]) > 2:
+            first, second = (odd[row] for row in same_unit)
+            if 0.5 < first / second < 2.0:
                 # Two sensors that agree on something that hardly moves: it hardly moves.
-                suspicious = {row: slope for row, slope in suspicious.items() if row not in alike}
+                suspicious = {
+                    row: slope for row, slope in suspicious.items() if row not in same_unit
+                }
     return suspicious
 
 

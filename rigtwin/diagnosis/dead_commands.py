@@ -68,6 +68,8 @@ def _computed_commands(
     if control is None or OWN in recording.controller:
         return {}
     inputs = [recording.column(*channel) for channel in control.channels]
+    # A dead input may drive an integrator of the controller beyond all limits. Such commands are
+    # dropped below.
     with np.errstate(all="ignore"):
         commands = control.replay(configuration.controller, inputs, recording.period)
     return {
@@ -84,7 +86,7 @@ def _moving_follower(machine: Machine, recording: Recording, name: str) -> str |
     None if there is no such sensor.
     """
     mover = machine.components[name]
-    follows = isinstance(getattr(machine.plant, name), Cylinder | PositionActuator)
+    follows = mover.component_type in (Cylinder, PositionActuator)
     if not follows or not mover.joint:
         return None
     loads = [recording.column(*row.channel) for row in machine.rows if row.kind == "force"]

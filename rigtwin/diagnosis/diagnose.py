@@ -9,19 +9,18 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 from threadpoolctl import threadpool_limits
 
 from rigtwin.components import Effect, with_parameters
 from rigtwin.components.plant import Plant
 from rigtwin.description.configuration import Configuration
-from rigtwin.description.machine import OWN, Machine
+from rigtwin.description.machine import Machine
 from rigtwin.diagnosis.confounding import find_confounded
 from rigtwin.diagnosis.contacts import find_contacts
-from rigtwin.diagnosis.controller import ControllerReplay, Deviation
-from rigtwin.diagnosis.copies import drop_copies, refuse_copies
-from rigtwin.diagnosis.cross_validation import Validation, gap_level, validate, with_effects
-from rigtwin.diagnosis.data_checks import SHORTEST, SHORTEST_PART, find_faults, require_fit
+from rigtwin.diagnosis.cross_validation import Validation, validate, with_effects
+from rigtwin.diagnosis.data_checks import SHORTEST_PART, find_faults, require_fit
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.explain import Explanation, candidates, explain
 from rigtwin.diagnosis.finding import (
@@ -36,9 +35,6 @@ from rigtwin.diagnosis.finding import (
 from rigtwin.diagnosis.findings import (
     choose_named,
     describe_attributed,
-    describe_controller,
-    describe_negligible,
-    describe_sensor,
     find_nearest,
     find_traces,
     list_unobservable,
@@ -50,17 +46,26 @@ from rigtwin.diagnosis.join import join
 from rigtwin.diagnosis.leftover import leftovers, steps
 from rigtwin.diagnosis.localisation import locate
 from rigtwin.diagnosis.next_test import propose_test
+from rigtwin.diagnosis.readings import SignalReadings, describe_readings, read_signals
 from rigtwin.diagnosis.regressors import describe_correlation
 from rigtwin.diagnosis.result import Diagnosis
-from rigtwin.diagnosis.sampling import SensorProperty, find_outstanding
-from rigtwin.diagnosis.short_recordings import drop_short, least_ticks
-from rigtwin.diagnosis.standstill import describe_standstill, find_standstill
+from rigtwin.diagnosis.sampling import SensorProperty
+from rigtwin.diagnosis.short_recordings import least_ticks
+from rigtwin.diagnosis.shrinkage import gap_level
+from rigtwin.diagnosis.signal_findings import (
+    describe_negligible,
+)
 from rigtwin.diagnosis.stops import find_cut_commands, find_stops
 from rigtwin.diagnosis.support import Support
 from rigtwin.diagnosis.text import sentence
 from rigtwin.diagnosis.thresholds import STANDARD, Thresholds
 from rigtwin.diagnosis.unknown_input import DisturbanceFit, locate_disturbance
 from rigtwin.diagnosis.unused_channels import describe_unused
+from rigtwin.diagnosis.usable_data import (
+    answer_unusable,
+    drop_unneeded,
+    recording_notes,
+)
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
 from rigtwin.simulation.energy import EnergyError
@@ -101,84 +106,6 @@ class _Judged:
     has_residual: bool
     plant: Plant
     notes: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class _Readings:
-    """Deviations that are read off signals, without a model of the mechanics.
-
-    Attributes
-    ----------
-    sampled
-        Properties of sensors that differ from the description.
-    deviations
-        Deviations of the controller from its settings.
-    negligible
-        Deviations of the controller that are too small to cause a gap.
-    """
-
-    sampled: tuple[SensorProperty, ...]
-    deviations: tuple[Deviation, ...]
-    negligible: tuple[Deviation, ...]
-
-    @property
-    def has_unknown_controller(self) -> bool:
-        """Whether no setting reproduces the controller's commands."""
-        return any(deviation.kind == "unknown" for deviation in self.deviations)
-
-
-def _answer_unusable(
-    machine: Machine,
-    recordings: Sequence[Recording],
-    configurations: Sequence[Configuration],
-    started: float,
-) -> Answer | None:
-    """Answer for recordings with a fault that forbids a diagnosis; None where there is none."""
-    faults = [
-        f"{recording.path}: {fault.message}"
-        for recording, configuration in zip(recordings, configurations, strict=True)
-        for fault in find_faults(machine, recording, configuration, least_ticks(recordings))
-        if fault.fatal
-    ]
-    total = sum(recording.ticks for recording in recordings)
-    if len(recordings) > 1 and total < SHORTEST:
-        faults.insert(
-            0, f"the recordings have {total} ticks together; a diagnosis needs at least {SHORTEST}"
-        )
-    if not faults:
-        return None
-    return Answer(
-        verdict="unusable",
-        sentence=f"The data cannot be diagnosed: {faults[0]}.",
-        faults=tuple(faults),
-        notes=_recording_notes(recordings),
-        recordings=tuple(str(recording.path) for recording in recordings),
-        seconds=time.perf_counter() - started,
-        machine=machine.name,
-    )
-
-
-def _answer_standstill(
-    machine: Machine, recordings: Sequence[Recording], started: float
-) -> Answer | None:
-    """Answer for recordings in which nothing moved; None where something did."""
-    standing = find_standstill(machine, recordings)
-    if not standing:
-        return None
-    return Answer(
-        verdict="unknown",
-        sentence=describe_standstill(machine, standing),
-        notes=_recording_notes(recordings),
-        recordings=tuple(str(recording.path) for recording in recordings),
-        seconds=time.perf_counter() - started,
-        machine=machine.name,
-    )
-
-
-def _recording_notes(recordings: Sequence[Recording]) -> tuple[str, ...]:
-    return tuple(
-        f"{recording.path.name}: {note}" for recording in recordings for note in recording.notes
-    )
 
 
 def diagnose(
@@ -226,40 +153,60 @@ def diagnose(
         same data as fitted ones.
     """
     started = time.perf_counter()
-    recordings, notes = drop_copies(recordings)
-    refuse_copies(held_out, recordings)
-    recordings, short = drop_short(recordings)
-    held_out, short_held_out = drop_short(held_out)
-    notes += [*short, *short_held_out]
+    recordings, held_out, notes = drop_unneeded(recordings, held_out)
     # BLAS threads would compete with the threads of the search.
     with threadpool_limits(1):
         configurations = [machine.configuration_of(recording, base) for recording in recordings]
-        unusable = _answer_standstill(machine, recordings, started) or _answer_unusable(
-            machine, recordings, configurations, started
-        )
+        unusable = answer_unusable(machine, recordings, configurations, started)
         if unusable is not None:
             return Diagnosis(unusable, machine, None, configurations[0])
         judging_configurations = _configure_held_out(machine, held_out, base)
+        notes += _contact_notes(machine, recordings)
+        fitted, judging = (recordings, configurations), (held_out, judging_configurations)
+        evidence_of = partial(_gather_evidence, fitted=fitted, judging=judging)
 
-        notes += [
-            f"{recording.path.name}: {line}"
-            for recording in recordings
-            for line in find_contacts(machine, recording)
-        ]
+        diagnosis = _diagnose_parts(
+            machine, evidence_of, tests, progress, first_look, thresholds, started
+        )
+        return _with_notes(diagnosis, notes)
 
-        def evidence_of(part: Machine) -> tuple[Evidence, Evidence | None]:
-            judging = Evidence(part, held_out, judging_configurations) if held_out else None
-            return Evidence(part, recordings, configurations), judging
 
-        # Joints that do not act on each other are diagnosed one by one: their effects cannot be
-        # confounded, and the search is much smaller.
-        parts = [
-            _diagnose_part(*evidence_of(part), tests, progress, first_look, thresholds, started)
-            for part in machine.physics.split(machine)
-        ]
-        if len(parts) == 1:
-            return _with_notes(parts[0], notes)
-        return _with_notes(join(*evidence_of(machine), parts, started), notes)
+def _gather_evidence(
+    part: Machine,
+    fitted: tuple[list[Recording], list[Configuration]],
+    judging: tuple[list[Recording], list[Configuration]],
+) -> tuple[Evidence, Evidence | None]:
+    """Evidence of a part of a machine, and that of the held-out recordings if there are any."""
+    held_out = Evidence(part, *judging) if judging[0] else None
+    return Evidence(part, *fitted), held_out
+
+
+def _diagnose_parts(
+    machine: Machine,
+    evidence_of: Callable[[Machine], tuple[Evidence, Evidence | None]],
+    tests: Sequence[Experiment],
+    progress: Callable[[str, int], object],
+    first_look: Callable[[FirstLook], object],
+    thresholds: Thresholds,
+    started: float,
+) -> Diagnosis:
+    """Diagnose the independent parts of a machine, and join their answers."""
+    # Joints that do not act on each other are diagnosed one by one: their effects cannot be
+    # confounded, and the search is much smaller.
+    parts = [
+        _diagnose_part(*evidence_of(part), tests, progress, first_look, thresholds, started)
+        for part in machine.physics.split(machine)
+    ]
+    # Joining needs evidence of the whole machine, which costs further predictions.
+    return parts[0] if len(parts) == 1 else join(*evidence_of(machine), parts, started)
+
+
+def _contact_notes(machine: Machine, recordings: Sequence[Recording]) -> list[str]:
+    return [
+        f"{recording.path.name}: {line}"
+        for recording in recordings
+        for line in find_contacts(machine, recording)
+    ]
 
 
 def _configure_held_out(
@@ -295,9 +242,11 @@ def _diagnose_part(
     named, plant = judged.named, judged.plant
     progress("locating the residual", 1)
     disturbances = locate_disturbance(evidence, plant, named) if judged.has_residual else ()
-    readings = _read_signals(evidence, plant, thresholds)
+    # Noise and hum are read off the residual of the corrected twin, which the named effects no
+    # longer disturb.
+    readings = read_signals(evidence, plant, thresholds)
     attributed = describe_attributed(explanation, named, judged.support, evidence, thresholds)
-    effects = [*attributed, *_describe_readings(readings, evidence, thresholds)]
+    effects = [*attributed, *describe_readings(readings, evidence, thresholds)]
     verdict = _choose_verdict(judged, readings, effects, thresholds)
     where = _places(evidence, attributed, judged, disturbances, readings)
     progress("replaying components", 1)
@@ -368,6 +317,7 @@ def _has_residual(explanation: Explanation, named: Sequence[Effect]) -> bool:
     posterior = explanation.posterior
     if set(named) == set(posterior.best.fit.effects):
         return posterior.has_unexplained_residual
+    # The named effects may be another scored hypothesis than the best one.
     identical = [
         hypothesis.scored
         for hypothesis in posterior.ranking
@@ -379,43 +329,8 @@ def _has_residual(explanation: Explanation, named: Sequence[Effect]) -> bool:
     return excess > posterior.prices.ordinary
 
 
-def _read_signals(evidence: Evidence, plant: Plant, thresholds: Thresholds) -> _Readings:
-    """Compare controller and sensors with their settings."""
-    deviations = _controller_deviations(evidence)
-    negligible = tuple(
-        deviation
-        for deviation in deviations
-        if deviation.kind in ("setting", "unknown")
-        and deviation.consequence < thresholds.controller_consequence
-    )
-    sampled = find_outstanding(
-        evidence.machine, evidence.recordings, evidence.predict(plant), evidence.plant
-    )
-    return _Readings(
-        tuple(sampled),
-        tuple(deviation for deviation in deviations if deviation not in negligible),
-        negligible,
-    )
-
-
-def _describe_readings(
-    readings: _Readings, evidence: Evidence, thresholds: Thresholds
-) -> list[Finding]:
-    return [
-        *(
-            describe_sensor(sensor, evidence, thresholds.highest_confidence)
-            for sensor in readings.sampled
-        ),
-        *(
-            describe_controller(deviation, thresholds.highest_confidence)
-            for deviation in readings.deviations
-            if deviation.kind != "unknown"
-        ),
-    ]
-
-
 def _choose_verdict(
-    judged: _Judged, readings: _Readings, effects: Sequence[Finding], thresholds: Thresholds
+    judged: _Judged, readings: SignalReadings, effects: Sequence[Finding], thresholds: Thresholds
 ) -> Verdict:
     has_residual = judged.has_residual or readings.has_unknown_controller
     if not effects:
@@ -424,9 +339,9 @@ def _choose_verdict(
     return "explained" if closes_enough and not has_residual else "partly explained"
 
 
-def _collect_notes(evidence: Evidence, judged: _Judged, readings: _Readings) -> list[str]:
+def _collect_notes(evidence: Evidence, judged: _Judged, readings: SignalReadings) -> list[str]:
     return [
-        *_recording_notes(evidence.recordings),
+        *recording_notes(evidence.recordings),
         *_clipping_notes(evidence),
         *find_stops(evidence.machine, evidence.recordings),
         *find_cut_commands(evidence.machine, evidence.recordings),
@@ -455,24 +370,10 @@ def _clipping_notes(evidence: Evidence) -> list[str]:
         for recording, configuration in zip(
             evidence.recordings, evidence.configurations, strict=True
         )
+        # The length was judged before, by the rules for the whole set.
         for fault in find_faults(evidence.machine, recording, configuration, SHORTEST_PART)
         if not fault.fatal
     ]
-
-
-def _controller_deviations(evidence: Evidence) -> list[Deviation]:
-    """Deviations of the controller from its settings, once for all recordings."""
-    deviations: dict[tuple[str, str], Deviation] = {}
-    control = evidence.machine.control
-    for recording, configuration in zip(evidence.recordings, evidence.configurations, strict=True):
-        is_configured = recording.controller or (control is not None and control.exact is not None)
-        if control is None or not is_configured or OWN in recording.controller:
-            # The recording holds no settings to compare with, or another controller ran.
-            continue
-        deviation = ControllerReplay(control, recording, configuration.controller).deviation()
-        if deviation is not None:
-            deviations[deviation.kind, deviation.name] = deviation
-    return list(deviations.values())
 
 
 def _places(
@@ -480,7 +381,7 @@ def _places(
     attributed: Sequence[Finding],
     judged: _Judged,
     disturbances: tuple[DisturbanceFit, ...],
-    readings: _Readings,
+    readings: SignalReadings,
 ) -> list[Place]:
     """Locations of the named effects and of the residual, then the controller if it is unknown."""
     named, fit = judged.named, judged.explanation.fit
@@ -497,6 +398,8 @@ def _places(
         places[effect.name] = replace(place, evidence=f"{effect.kind.title}, {place.evidence}")
     if disturbances:
         foremost = disturbances[0]
+        # The shares of the findings add up to the explained part of the gap's power
+        # (`findings._shares`).
         share = max(1.0 - sum(finding.share for finding in attributed), 0.0)
         correlation = describe_correlation(foremost.forms)
         residual = evidence.differences(judged.plant)

@@ -48,6 +48,8 @@ def runs_backwards(
     # The reversed prediction costs a simulation, so that it is made only if the forward one fails.
     if not np.isfinite(forward).all() or forward.max() < LEAST_MISFIT:
         return False
+    # Without damping the equations of motion hold in both directions of time: t → -t leaves the
+    # acceleration as it is. Only dissipation and delays tell them apart.
     columns = {
         topic: {name: values[::-1] for name, values in signals.items()}
         for topic, signals in recording.columns.items()
@@ -62,5 +64,6 @@ def _misfits(measured: Array, predicted: Array) -> Array:
     """Return the standard deviation of each signal's residual in units of its noise, (rows,)."""
     residual = measured - predicted
     residual = residual - residual.mean(axis=1, keepdims=True)
+    # A signal without visible noise, such as a computed command, must not have an infinite misfit.
     noise = [max(white_noise(row), 1e-12 * rms(row), 1e-300) for row in measured]
     return np.sqrt(np.mean(residual**2, axis=1)) / np.array(noise)

@@ -24,50 +24,30 @@ and have weight 0.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from copy import copy
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.fft import rfft, rfftfreq
+from numpy.fft import rfft
 from numpy.typing import NDArray
-from scipy.fft import next_fast_len
 
 from rigtwin.components.plant import Plant
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Machine
 from rigtwin.description.tolerance import Tolerance
+from rigtwin.diagnosis.lines import smooth, spectrum_of_noise, weigh_lines
+from rigtwin.diagnosis.spikes import JUMPS, SPIKE, despike
 from rigtwin.models.model import Model
 from rigtwin.numerics.arrays import Array
-from rigtwin.numerics.compiling import kernel
 from rigtwin.recording import Recording
-from rigtwin.signals.band import limit_band
-from rigtwin.signals.noise import remove_mains, smallest_step, white_noise
-from rigtwin.signals.runs import find_cut_off
+from rigtwin.signals.noise import remove_mains, white_noise
 
-HIGHEST_FREQUENCY = 150.0
-"""Highest frequency that is compared, Hz. No component moves above it, so that further lines would
-only add noise."""
-MAINS_WIDTH = 0.8
-"""Half width of the excluded band around the mains frequency, Hz."""
-FULL_WEIGHT_TIME = 0.7
-"""Time from which a test has full weight, s. By then the plates have forgotten their unknown
-start."""
-IGNORED_SHARE = 0.3
-"""Share of `FULL_WEIGHT_TIME` that has no weight at all."""
 ROUNDING_FACTOR = 4.0
 """Factor applied to the variance of the rounded prediction, since the true rounding errors differ
 from the predicted ones."""
-LEAST_NOISE_SHARE = 1e-6
-"""Lowest noise of a signal, as a share of its standard deviation."""
 COARSE_BIT_RATIO = 2.0
 """Ratio of bit to noise above which the rounding error follows the signal and is not white."""
-JUMPS = ("force", "command")
-"""Kinds of signal that jump where dry friction reverses. Positions and velocities do not."""
-SPIKE = 4.0
-"""Height above its neighbours from which a sample is a spike, in units of the signal's noise."""
 STEP_ERROR_FACTOR = 4.0
 """Factor applied to the variance of the change when the integration step is halved."""
 SEARCH_PERIOD = 2.5e-3
@@ -78,175 +58,8 @@ FEWEST_STEPS = 2
 """Minimum number of integration steps per tick. A search uses half."""
 STEP_TOLERANCE = 0.05
 """Largest change when the integration step is halved, as a share of noise or declared error."""
-SMOOTHING_LINES = 8
-"""Lines to either side over which a signal's power spectrum is averaged."""
 UNKNOWN_ENDS = 10
 """Ticks at either end of a recording at which the measured acceleration is unknown."""
-NOISE_SMOOTHING_LINES = 32
-"""Lines to either side over which the spectrum of a single draw of noise is averaged."""
-
-
-@dataclass(frozen=True)
-class Lines:
-    """One recording in the frequency domain.
-
-    Attributes
-    ----------
-    frequency
-        Frequency of each line, Hz, shape (lines,).
-    weight
-        Factor applied to the transform of a residual, 1/sqrt(v) of the module's equation; 0 near
-        the mains frequency; shape (rows, lines).
-    spread
-        Variance of the noise alone in each line, n of the module's equation, shape (rows, lines).
-    fade
-        Window applied to a residual in the time domain, 0 to 1, shape (rows, ticks).
-    measured
-        Measured signals, shape (rows, ticks).
-    noise
-        Noise rms of each signal, shape (rows,).
-    bit
-        Quantisation step of each signal, shape (rows,).
-    length
-        Length of the transform; at least the number of ticks.
-    period
-        Time from tick to tick, s.
-    """
-
-    frequency: Array
-    weight: Array
-    spread: Array
-    fade: Array
-    measured: Array
-    noise: Array
-    bit: Array
-    length: int
-    period: float
-
-
-def weigh_lines(
-    machine: Machine, recording: Recording, model: Model[Any], plant: Plant, counted: Array
-) -> Lines:
-    """Transform a recording to the frequency domain and weigh each line of its signals.
-
-    Parameters
-    ----------
-    machine
-        Machine the recording belongs to.
-    recording
-        Recording that is transformed.
-    model
-        Model of the machine under the recording's inputs.
-    plant
-        Plant at which noise is propagated to the predictions.
-    counted
-        Weight of each tick, 0 to 1, shape (ticks,).
-
-    Returns
-    -------
-    Lines
-        The recording in the frequency domain.
-    """
-    whole = np.stack([recording.column(*row.channel) for row in machine.rows])
-    measured = limit_band(whole, model.band, recording.period)[:, :: model.every].copy()
-    ticks = measured.shape[1]
-    period = model.every * recording.period
-    limited = math.isfinite(model.band)
-    # The FFT is fastest at lengths with small prime factors; zeros are appended.
-    length = int(next_fast_len(ticks, real=True) or ticks)
-    frequency = rfftfreq(length, period)
-    used = frequency <= min(HIGHEST_FREQUENCY, 0.4 / period, model.band)
-    width = max(MAINS_WIDTH, 2.0 / (ticks * period))
-    off_mains = np.abs(frequency[used] - plant.mains.frequency) > width
-    noise = np.array([white_noise(row) for row in whole])
-    resolution = np.array([smallest_step(row) for row in whole])
-    # Rounding to a bit q is uniform noise of the rms q / sqrt(12).
-    floor = np.maximum(noise, resolution / np.sqrt(12.0))
-    # A signal without visible noise, such as a relay's, is still not known exactly.
-    floor = np.maximum(floor, LEAST_NOISE_SHARE * np.std(whole, axis=1))
-    fade = _windows(recording, model, whole, counted)
-    propagated = model.propagated_noise(plant)
-    if propagated is not None:
-        # A controller's command has no noise of its own; that of its sensors is propagated.
-        floor[[row.kind == "command" for row in machine.rows]] = 0.0
-    # Noise was filtered before ticks were left out, so none is folded into the band.
-    folded = 1.0 / model.every if limited else 1.0
-    spread = _noise_variance(machine, fade, floor, propagated, folded, length, int(used.sum()))
-    weight = np.empty_like(spread)
-    for row in range(len(measured)):
-        swing = fade[row] * (measured[row] - np.mean(measured[row]))
-        power = np.abs(rfft(swing, length)[used]) ** 2
-        error = _model_error(power, machine.form_of(machine.rows[row]), machine.prior.even)
-        variance = spread[row] + error + 1e-300
-        weight[row] = off_mains / np.sqrt(variance)
-    if limited:
-        # The band limit leaves only the share of white noise within it, and smooths the bits.
-        floor = floor * math.sqrt(min(2.0 * model.band * recording.period, 1.0))
-        resolution = np.zeros_like(resolution)
-    if propagated is not None:
-        floor = np.sqrt(floor**2 + np.var(propagated, axis=1))
-    floor = np.maximum(floor, 1e-300)
-    return Lines(
-        frequency=frequency[used],
-        weight=weight,
-        spread=spread,
-        fade=fade,
-        measured=measured,
-        noise=floor,
-        bit=resolution,
-        length=length,
-        period=period,
-    )
-
-
-def _windows(recording: Recording, model: Model[Any], whole: Array, counted: Array) -> Array:
-    """Return the window of each signal: 0 where a sensor is cut off or the model undetermined."""
-    fade = np.stack(
-        [
-            (_fade(len(row), recording.period) * counted * ~find_cut_off(row))[:: model.every]
-            for row in whole
-        ]
-    )
-    if (undetermined := model.undetermined()) is not None:
-        fade *= np.logical_not(undetermined)
-    return fade
-
-
-def _noise_variance(
-    machine: Machine,
-    fade: Array,
-    floor: Array,
-    propagated: Array | None,
-    folded: float,
-    length: int,
-    count: int,
-) -> Array:
-    """Return the variance of noise in real and imaginary part of each line, n of the equation.
-
-    `propagated` is a draw of the noise that a measured motion adds to the prediction, shape (rows,
-    ticks). `folded` is the share of white noise that leaving out ticks does not alias.
-    """
-    spread = np.empty((len(fade), count))
-    for row in range(len(fade)):
-        # A white sequence of the rms s under a window w has E|F_k|^2 = s^2 sum(w^2) in every line,
-        # half of it in the real part.
-        spread[row] = 0.5 * float(fade[row] @ fade[row]) * folded * floor[row] ** 2
-        if propagated is not None:
-            height = SPIKE * float(floor[row]) if machine.rows[row].kind in JUMPS else 0.0
-            spread[row] += _spectrum_of_noise(propagated[row], fade[row], length, height)[:count]
-    return spread
-
-
-def _model_error(power: Array, form: float, even: float) -> Array:
-    """Return the variance of the declared model error in each line, m of the equation.
-
-    The error follows the signal's spectrum where the model is known. It is spread evenly where the
-    frequency content of the unmodelled part is unknown.
-    """
-    error = 0.5 * form**2 * (even * float(np.mean(power)) + (1.0 - even) * _smooth(power))
-    # The error is declared for a signal's swing and does not apply to its mean.
-    error[0] *= even
-    return error
 
 
 def _model_with_enough_steps(
@@ -267,6 +80,8 @@ def _model_with_enough_steps(
         for row in machine.rows
     ]
     predicted = model.predict(configuration.plant)
+    # For an integrator of order p the change is (1 - 2^-p) of the coarser model's error, so at
+    # least half of it (Richardson).
     while steps < most:
         finer = model.double_steps()
         refined = finer.predict(configuration.plant)
@@ -275,75 +90,6 @@ def _model_with_enough_steps(
             break
         model, predicted, steps = finer, refined, 2 * steps
     return model
-
-
-def _spectrum_of_noise(noise: Array, fade: Array, length: int, height: float) -> Array:
-    """Return half the power of a draw of noise in each line, averaged over neighbouring lines.
-
-    Spikes higher than `height` are removed first, as they are from the residual; 0 keeps them.
-    """
-    if height > 0.0:
-        noise = noise.copy()
-        despike(noise, height)
-    # One draw has exponentially distributed powers; averaging over 65 lines leaves 12 % of scatter.
-    return 0.5 * _smooth(np.abs(rfft(fade * noise, length)) ** 2, NOISE_SMOOTHING_LINES)
-
-
-def _smooth(power: Array, lines: int = SMOOTHING_LINES) -> Array:
-    """Average a power spectrum over neighbouring lines to either side.
-
-    A spectrum too short for that is averaged over fewer lines.
-    """
-    lines = min(lines, (len(power) - 1) // 2)
-    return np.convolve(power, np.ones(2 * lines + 1) / (2 * lines + 1), mode="same")
-
-
-def _fade(ticks: int, period: float) -> Array:
-    """Return a window that is 0 while the rig's state is unknown and then rises to 1.
-
-    The rise is half a period of a cosine, so that the window adds no high frequencies.
-    """
-    time, end = np.arange(ticks) * period, min(FULL_WEIGHT_TIME, 0.15 * ticks * period)
-    rise = (time / end - IGNORED_SHARE) / (1.0 - IGNORED_SHARE)
-    return 0.5 - 0.5 * np.cos(np.pi * np.clip(rise, 0.0, 1.0))
-
-
-@kernel
-def despike(signal: Array, height: float) -> None:
-    """Replace spikes in place by the median of the seven samples about them.
-
-    Parameters
-    ----------
-    signal
-        Samples, shape (ticks,). The first and the last three are not changed.
-    height
-        Distance from the median above which a sample is a spike, in the signal's unit.
-    """
-    ticks = len(signal)
-    if ticks < 7:
-        return
-    original = signal.copy()
-    # A sample within `height` of three of its neighbours cannot be that far from the median of
-    # seven. Counting these first avoids sorting at nearly every tick.
-    close = np.zeros(ticks, np.int8)
-    for away in (-3, -2, -1, 1, 2, 3):
-        for tick in range(3, ticks - 3):
-            close[tick] += np.int8(abs(original[tick + away] - original[tick]) <= height)
-    window = np.empty(7)
-    for tick in range(3, ticks - 3):
-        if close[tick] >= 3:
-            continue
-        window[:] = original[tick - 3 : tick + 4]
-        # Insertion sort of seven values: np.median would allocate at every tick.
-        for place in range(1, 7):
-            value = window[place]
-            before_it = place - 1
-            while before_it >= 0 and window[before_it] > value:
-                window[before_it + 1] = window[before_it]
-                before_it -= 1
-            window[before_it + 1] = value
-        if abs(original[tick] - window[3]) > height:
-            signal[tick] = window[3]
 
 
 class Evidence:
@@ -463,21 +209,24 @@ class Evidence:
             ]
             spread = np.stack(
                 [
-                    _spectrum_of_noise(row, fade, lines.length, height)[:count]
+                    spectrum_of_noise(row, fade, lines.length, height)[:count]
                     for row, fade, height in zip(propagated, lines.fade, heights, strict=True)
                 ]
             )
+            # weight² is 1 / v, so the excess becomes relative to the variance of the line.
             excesses.append(np.maximum(spread - lines.spread, 0.0) * lines.weight**2)
         return excesses
 
     def halve_steps(self) -> Evidence:
         """Return the same evidence with half the integration steps, for use in a search only."""
+        # The shallow copy shares lines and weights, so that misfits of both have the same meaning.
         coarse = copy(self)
         coarse.models = [model.halve_steps() for model in self.models]
         return coarse
 
     def thin(self) -> Evidence:
         """Return the same evidence with fewer ticks where the models allow it, for a search."""
+        # Other ticks have other spectra, so unlike in `halve_steps` the lines are computed anew.
         thinned = copy(self)
         thinned.models = [model.thin(SEARCH_PERIOD) for model in self.models]
         if all(model is whole for model, whole in zip(thinned.models, self.models, strict=True)):
@@ -493,7 +242,7 @@ class Evidence:
             )
             power = np.abs(rfft(change, lines.length, axis=1)[:, : len(lines.frequency)]) ** 2
             for row in range(len(self.names)):
-                variance = STEP_ERROR_FACTOR * 0.5 * _smooth(power[row])
+                variance = STEP_ERROR_FACTOR * 0.5 * smooth(power[row])
                 # 1/sqrt(v + d) = (1/sqrt(v)) / sqrt(1 + d / v); a weight of 0 stays 0.
                 lines.weight[row] /= np.sqrt(1.0 + variance * lines.weight[row] ** 2)
 
@@ -510,7 +259,7 @@ class Evidence:
                         np.round(predictions[row] / bit) * bit - predictions[row]
                     )
                     power = np.abs(rfft(rounded, lines.length))[: len(lines.frequency)] ** 2
-                    variance = 0.5 * ROUNDING_FACTOR * _smooth(power)
+                    variance = 0.5 * ROUNDING_FACTOR * smooth(power)
                     lines.weight[row] /= np.sqrt(1.0 + variance * lines.weight[row] ** 2)
 
     def predict(self, plant: Plant) -> list[Array]:
@@ -581,6 +330,7 @@ class Evidence:
     def transforms(self, differences: Sequence[Array]) -> Iterator[NDArray[np.complex128]]:
         """Yield the weighted spectra of differences, shape (rows, lines) for each recording."""
         for lines, difference in zip(self.lines, differences, strict=True):
+            # The compared lines are the lowest ones, so they are the beginning of the spectrum.
             yield (
                 rfft(lines.fade * difference, lines.length, axis=1)[:, : len(lines.frequency)]
                 * lines.weight
@@ -602,6 +352,7 @@ class Evidence:
         """
         parts = [model.missing_force(plant) for model in self.models]
         known = [part[UNKNOWN_ENDS:-UNKNOWN_ENDS] for part in parts if part is not None]
+        # All recordings or none, so that the vectors of all plants have one length.
         return np.concatenate(known) if len(known) == len(parts) else None
 
     def residual(self, plant: Plant) -> Array:
@@ -652,6 +403,7 @@ class Evidence:
         before = self.predict(plant)
         columns = []
         for tolerance in self.machine.tolerances:
+            # A sensor's tolerance acts linearly, for which one side suffices.
             width = self.width(tolerance)
             after, scale = self.predict(tolerance.shift(plant, width)), 1.0
             start = before
@@ -685,6 +437,8 @@ def relative_errors(evidence: Evidence, plant: Plant) -> Array:
     """
     errors = []
     for lines, predicted in zip(evidence.lines, evidence.predict(plant), strict=True):
+        # The state of the twin is unknown at the start of a recording, where no signal has weight
+        # yet.
         counts = lines.fade.max(axis=0) > 0.5
         scale = np.maximum(np.std(lines.measured, axis=1), lines.noise)
         relative = (lines.measured - predicted)[:, counts] / scale[:, None]

@@ -117,6 +117,7 @@ def _unobservable(search: HypothesisSearch, posterior: HypothesisPosterior) -> t
             return True
         if not best.effects or not is_possible((*best.effects, effect), coarse.plant):
             return False
+        # Responses are stored in single precision, but their squares are summed in double.
         responses = coarse.responses_beside(effect, best)
         largest = max(coarse.space.misfit(part.astype(np.float64)) for _, part in responses)
         return largest >= OBSERVABLE
@@ -132,6 +133,7 @@ def _nest(search: HypothesisSearch, fit: Fit) -> list[Fit]:
         for _, remaining, values in leave_one_out(chain[0]):
             if not is_possible(remaining, search.fine.plant):
                 continue
+            # Most subsets were fitted on the way to the best hypothesis, and need no second fit.
             known = search.pool.get(frozenset(remaining))
             fewer.append(known.fit if known is not None else search.fine.refine(remaining, values))
         if not fewer:

@@ -22,7 +22,7 @@ from bokeh.resources import Resources
 from markupsafe import Markup
 
 from rigtwin.diagnosis.overlay import Overlay
-from rigtwin.diagnosis.pictures import Picture, PictureCurve
+from rigtwin.diagnosis.picture import Picture, PictureCurve
 from rigtwin.diagnosis.units import find_unit, spell
 from rigtwin.numerics.arrays import Array
 
@@ -110,13 +110,16 @@ def thin(time: Array, values: Array, points: int) -> tuple[Array, Array]:
     """
     if len(values) <= points:
         return time, values
+    # Two values of each block remain, hence the factor 2.
     block = math.ceil(2 * len(values) / points)
     whole = len(values) // block * block
     folded = values[:whole].reshape(-1, block)
     start = np.arange(len(folded)) * block
+    # `unique` also sorts, as the minimum of a block may come after its maximum.
     remaining = np.unique(
         np.concatenate([start + folded.argmin(axis=1), start + folded.argmax(axis=1)])
     )
+    # The line must reach the end of the recording also where the last block is incomplete.
     if whole < len(values):
         remaining = np.append(remaining, len(values) - 1)
     return time[remaining], values[remaining]
@@ -259,6 +262,7 @@ def draw_overlay(overlay: Overlay, points: int, corrected: bool) -> figure:
     in_view = (overlay.time >= start) & (overlay.time <= end)
     shown = np.concatenate([factor * values[in_view] for values in signals.values()])
     low, high = float(shown.min()), float(shown.max())
+    # A constant signal would have an axis without height.
     margin = MARGIN * (high - low) or 1.0
     drawn.y_range = Range1d(low - margin, high + margin)
     for role, values in signals.items():
@@ -270,6 +274,7 @@ def draw_overlay(overlay: Overlay, points: int, corrected: bool) -> figure:
 
 def _thin_outside(time: Array, values: Array, in_view: Array, points: int) -> tuple[Array, Array]:
     """Thin a line, with half of the points for the stretch in view."""
+    # `argmax` of a mask is its first true place; reversed, it counts the ticks after the view.
     first, last = int(np.argmax(in_view)), len(in_view) - int(np.argmax(in_view[::-1]))
     parts = [
         thin(time[part], values[part], count)
@@ -312,6 +317,8 @@ def _name_reproducibly(script: str, places: Sequence[str]) -> list[str]:
     texts = [script, *places]
     names = list(dict.fromkeys(name for text in texts for name in IDENTIFIER.findall(text)))
     numbers = {name: number for number, name in enumerate(names)}
+    # The digest must be one of the content alone, so the random identifiers are numbered before it
+    # is taken.
     bare = [IDENTIFIER.sub(lambda match: f'"{numbers[match[1]]}"', text) for text in texts]
     page = hashlib.sha256("".join(bare).encode()).hexdigest()[:8]
     return [IDENTIFIER.sub(lambda match: f'"{page}-{numbers[match[1]]}"', text) for text in texts]
@@ -335,6 +342,7 @@ def draw(pictures: Sequence[Picture], overlays: Sequence[Overlay], corrected: bo
         Markup and scripts for the page. Empty without pictures and overlays.
     """
     lines = (3 if corrected else 2) * max(len(overlays), 1)
+    # The points of all lines together decide on the size of the file.
     points = min(max(ALL_POINTS // lines, LEAST), MOST)
     captions = [picture.caption for picture in pictures]
     captions += [_caption(overlay, corrected) for overlay in overlays]

@@ -136,6 +136,7 @@ class Confounded:
 
     def document(self) -> dict[str, Any]:
         """Return the entry as JSON has it."""
+        # The key `with` is a keyword of Python, so the field has another name.
         exponents = [{**asdict(name), "exponent": power} for name, power in self.exponents]
         return {**asdict(self.assumed), "value": self.value, "unit": self.unit, "with": exponents}
 

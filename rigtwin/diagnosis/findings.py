@@ -5,21 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from rigtwin.components import UNLIMITED, Effect, find, title
+from rigtwin.components import UNLIMITED, Effect
 from rigtwin.components.effect import Points
 from rigtwin.components.plant import Plant
 from rigtwin.diagnosis.confidence import support_of
-from rigtwin.diagnosis.controller import Deviation
 from rigtwin.diagnosis.cross_validation import with_effects
 from rigtwin.diagnosis.evidence import Evidence, relative_errors
 from rigtwin.diagnosis.explain import Explanation
 from rigtwin.diagnosis.finding import Estimate, Finding, Name, Nearest, Rival, Unobservable
 from rigtwin.diagnosis.fit import Fit
 from rigtwin.diagnosis.posterior import HypothesisPosterior
-from rigtwin.diagnosis.sampling import SensorProperty
 from rigtwin.diagnosis.scoring import Scored
 from rigtwin.diagnosis.support import Support
-from rigtwin.diagnosis.text import format_distinct
 from rigtwin.diagnosis.thresholds import STANDARD, Thresholds
 
 WIDEST = 0.9
@@ -30,10 +27,6 @@ TRACE_WEIGHT = 1e-3
 """Weight from which a hypothesis with one more effect makes that effect a trace."""
 TRACE_SHARE = 0.005
 """Share of the gap that the effects of a trace must close together."""
-READING_ERROR = 0.05
-"""Half interval of a sensor property that is read off the signal, as a share of its value."""
-SETTING_ERROR = 1e-3
-"""Half interval of a controller setting that reproduces the commands, as a share of its value."""
 
 
 def measure_support(
@@ -91,6 +84,8 @@ def choose_named(
         _standard_errors(explanation, support, thresholds),
         strict=True,
     ):
+        # Standard errors with all their parts are used, also those of residual and hypotheses, as
+        # the answer shows them.
         steadiness = effect.steadiness(values, widths, posterior.nominal)
         if steadiness <= thresholds.interval_half_width:
             # The interval holds the nominal value, so the data do not ask for a change.
@@ -98,6 +93,7 @@ def choose_named(
         shares = [
             posterior.inclusion(candidate) for candidate in (effect, *posterior.rivals(effect))
         ]
+        # A hypothesis with two of the rivals counts twice in the sum, which may therefore exceed 1.
         probability = min(sum(shares), 1.0) * (1.0 - support[effect].mimic)
         # Effective number of rivals (inverse participation ratio): n for n equal shares.
         members = sum(shares) ** 2 / sum(share**2 for share in shares)
@@ -174,6 +170,8 @@ def _describe_rival(
     rest = set(explanation.fit.effects) - {effect}
     for hypothesis in explanation.posterior.ranking:
         scored = hypothesis.scored
+        # The ranking is sorted by cost, so the first hypothesis that fits the description is the
+        # best one.
         if rival in scored.fit.effects and rest <= set(scored.fit.effects):
             beside = []
             for member in scored.fit.effects:
@@ -232,6 +230,8 @@ def _standard_errors(
         bias = share * distance
         widest = WIDEST * distance / thresholds.interval_half_width
         count = effect.kind.magnitudes
+        # The limit applies to the bias alone: a formal error beyond it stays as it is. A residual
+        # says little about shapes, so only magnitudes are widened.
         widened = [min(math.hypot(width, bias), max(width, widest)) for width in formal[:count]]
         errors.append((*widened, *formal[count:]))
     return errors
@@ -257,6 +257,7 @@ def _shares(
 
     The parts are proportional to the misfit that returns when each effect alone is left out.
     """
+    # `closes` is a share of the gap's amplitude, and findings have shares of its power.
     explained = min(max(1.0 - (1.0 - posterior.closes(posterior.best)) ** 2, 0.0), 1.0)
     if len(named) <= 1:
         return dict.fromkeys(named, explained)
@@ -388,6 +389,8 @@ def estimates(
     nominal = effect.nominal(evidence.plant)
     # The instant of sampling within a tick is a tolerance, so no delay is known better than that.
     timing = max((evidence.width(t) for t in evidence.machine.tolerances if t.ticks), default=0.0)
+    # Divided here because the interval is `wider` times as wide: half of it is then at least the
+    # tolerance.
     least = {"delay": timing / wider}
     return {
         name: Estimate(
@@ -403,80 +406,6 @@ def estimates(
         # A secondary parameter of width zero was not fitted: no recorded motion depends on it.
         if width > 0.0 or name in (effect.kind.parameters[0], *effect.kind.constants)
     }
-
-
-def describe_sensor(measured: SensorProperty, evidence: Evidence, confidence: float) -> Finding:
-    """Describe a property that is read off a sensor's own signal, such as its noise.
-
-    Parameters
-    ----------
-    measured
-        Property of the sensor, in the sensor's unit.
-    evidence
-        Recordings that were read.
-    confidence
-        Confidence of the finding.
-
-    Returns
-    -------
-    Finding
-        Finding with no rivals: no other effect changes a signal in this way.
-    """
-    effect = find(f"{measured.kind}@{measured.component}", evidence.plant)
-    unit = evidence.machine.unit(effect.group, effect.quantities()[measured.parameter])
-    spread = READING_ERROR * measured.value
-    estimate = Estimate(
-        measured.value, measured.value - spread, measured.value + spread, measured.nominal, unit
-    )
-    name = Name(measured.component, measured.kind)
-    return Finding(
-        name, {measured.parameter: estimate}, confidence, (name,), 1.0, effect.kind.title
-    )
-
-
-def describe_controller(deviation: Deviation, confidence: float) -> Finding:
-    """Describe a setting that the controller did not use as configured.
-
-    Parameters
-    ----------
-    deviation
-        Setting, its configured value and the value that reproduces the recorded commands.
-    confidence
-        Confidence of the finding.
-
-    Returns
-    -------
-    Finding
-        Finding at the component "controller".
-    """
-    name = Name("controller", deviation.kind)
-    spread = SETTING_ERROR * abs(deviation.used)
-    estimate = Estimate(
-        deviation.used,
-        deviation.used - spread,
-        deviation.used + spread,
-        deviation.told,
-        deviation.unit,
-    )
-    return Finding(
-        name, {deviation.name: estimate}, confidence, (name,), 1.0, title(deviation.kind)
-    )
-
-
-def describe_negligible(deviation: Deviation) -> str:
-    """Describe a deviation of the controller that is too small to cause a gap, as a note."""
-    share = f"{100 * deviation.consequence:.1g} %"
-    if deviation.kind == "unknown":
-        return (
-            f"the controller's commands differ by {share} from those of its settings; "
-            "this causes no gap"
-        )
-    used, configured = format_distinct(deviation.used, deviation.told)
-    unit = "" if deviation.unit == "1" else f" {deviation.unit}"
-    return (
-        f"the controller's {deviation.name} is {used}{unit} instead of {configured}{unit}, "
-        f"which changes no command by more than {share}; this causes no gap"
-    )
 
 
 def list_unobservable(

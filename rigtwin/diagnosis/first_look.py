@@ -77,6 +77,7 @@ def look_first(
     suspects = [
         (
             Name(candidate.effect.component, candidate.effect.kind.name),
+            # A promise to first order may exceed the whole gap.
             min(candidate.promise / max(gap, most, 1e-300), 1.0),
         )
         for candidate in foremost
@@ -92,6 +93,8 @@ def _levels(evidence: Evidence) -> dict[str, float]:
     for recorded, residual in zip(
         evidence.lines, evidence.differences(evidence.plant), strict=True
     ):
+        # The state of the twin is unknown at the start of a recording, where no signal has weight
+        # yet.
         counts = recorded.fade.max(axis=0) > 0.5
         powers += np.sum((residual[:, counts] / recorded.noise[:, None]) ** 2, axis=1)
         ticks += int(counts.sum())

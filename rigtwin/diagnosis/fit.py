@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from rigtwin.components import Effect, Guide
 from rigtwin.components.guide import THROUGH_FRICTION
-from rigtwin.components.plant import P, Plant, with_parameters
+from rigtwin.components.plant import P, Plant, parameter_of, with_parameters
 
 Values = tuple[tuple[float, ...], ...]
 """Values of several effects: one tuple per effect, in the order of its kind's parameters."""
@@ -110,12 +110,14 @@ def is_possible(effects: Sequence[Effect], plant: Plant) -> bool:
     bool
         False if a play, a spring or a Stribeck peak of a guide has no dry friction in series.
     """
+    # Either a fitted friction or that of the plant will do: the kinds of `THROUGH_FRICTION` act in
+    # series with it.
     dry = {effect.group for effect in effects if effect.kind.name == "coulomb"}
     return all(
         effect.of is not Guide
         or effect.kind.name not in THROUGH_FRICTION
         or effect.group in dry
-        or getattr(plant, effect.group).coulomb > 0.0
+        or parameter_of(plant, effect.group, "coulomb") > 0.0
         for effect in effects
     )
 

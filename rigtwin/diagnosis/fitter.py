@@ -18,11 +18,12 @@ import numpy as np
 from rigtwin.components import Effect, Guide, Scales, Starts
 from rigtwin.components.effect import Swing
 from rigtwin.components.guide import resists
-from rigtwin.components.plant import Plant
-from rigtwin.diagnosis.evidence import JUMPS, Evidence
+from rigtwin.components.plant import Plant, component_of
+from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.fit import Fit, Values, is_possible, with_values
 from rigtwin.diagnosis.gauss_newton import is_sufficient, minimise
 from rigtwin.diagnosis.space import Space
+from rigtwin.diagnosis.spikes import JUMPS
 from rigtwin.diagnosis.swing import swings
 from rigtwin.numerics.arrays import Array
 
@@ -131,6 +132,7 @@ class Fitter:
             forces = [
                 measured[n] for n, row in enumerate(self.evidence.machine.rows) if row.kind in JUMPS
             ]
+            # A machine without a measured force or command has none to scale by.
             force = max((float(np.sqrt(np.mean(column**2))) for column in forces), default=0.0)
             motion = self.evidence.models[longest].motion(component, self.plant)
             period = self.evidence.lines[longest].period
@@ -145,8 +147,8 @@ class Fitter:
             return None
         joint = described[component].joint
         for number, row in enumerate(self.evidence.machine.rows):
-            same = row.name in described and described[row.name].joint == joint
-            if row.kind == "position" and joint is not None and same:
+            at_joint = row.name in described and described[row.name].joint == joint
+            if row.kind == "position" and joint is not None and at_joint:
                 return np.concatenate([lines.measured[number] for lines in self.evidence.lines])
         return None
 
@@ -164,6 +166,8 @@ class Fitter:
             shapes.setdefault((sign, *values[1:]), []).append(values)
         few = []
         for values in shapes.values():
+            # Sorted by distance from nominal, the first is the smallest change and that in the
+            # middle a typical one.
             values.sort(key=lambda start: abs(start[0] - nominal))
             few.append(values[len(values) // 2])
             if effect.kind.name not in LIMITS and not starts.is_linear:
@@ -204,6 +208,7 @@ class Fitter:
             scored += self._blend(effect, responses)
         elif starts.is_linear:
             scored += self._combine(effect, responses)
+        # Tuples sort by misfit and then by values, so equal misfits have a reproducible order.
         scored.sort()
         promise = max(self.nominal_fit.misfit - scored[0][0], self._promise(effect, responses))
         return Screened(effect, tuple(scored), promise)
@@ -214,6 +219,8 @@ class Fitter:
         A further small magnitude is simulated, since its response may differ from those of large
         ones.
         """
+        # Tuples compare by their first element, the magnitude: this is the lowest start, which may
+        # be the most negative one. Scaled by `SMALL_START` it is small either way.
         small = self.scale_start(effect, min(start for start, _ in responses), SMALL_START)
         residual = self.evidence.residual(with_values(self.plant, (effect,), small))
         shapes = [response for _, response in responses] + [self._nominal_residual - residual]
@@ -224,6 +231,8 @@ class Fitter:
         )
         observable = power > NO_RESPONSE
         explained = float(np.max(along[observable] ** 2 / power[observable], initial=0.0))
+        # Fixing the tolerance that the effect replaces raises the misfit without it. The effect has
+        # to make up for that before it explains anything.
         return explained - (space.misfit(self._nominal_residual) - self.nominal_fit.misfit)
 
     def fit_one(self, screened: Screened) -> Fit:
@@ -264,6 +273,8 @@ class Fitter:
         blends = []
         for (start, cosine), (_, sine) in zip(responses[::2], responses[1::2], strict=True):
             pair = self.space.project_out(np.stack([cosine, sine], axis=1).astype(np.float64))
+            # Project the tolerances out of both sides, or the strengths would contain what a
+            # tolerance explains as well.
             strengths = np.linalg.lstsq(pair, remainder, rcond=None)[0]
             gain = float(np.sum((pair @ strengths) ** 2))
             amplitude = start[0] * float(np.hypot(*strengths))
@@ -291,6 +302,8 @@ class Fitter:
         strengths = np.linalg.lstsq(shapes, remainder, rcond=None)[0]
         count, nominal = effect.kind.magnitudes, tuple(effect.nominal(self.plant).values())
         starts = np.array([start[:count] for start, _ in responses])
+        # The law is linear in its magnitudes, so the same combination of starts has the combined
+        # response.
         combined = np.array(nominal[:count]) + strengths @ (starts - np.array(nominal[:count]))
         start = (*combined.tolist(), *responses[0][0][count:])
         residual = self.evidence.residual(with_values(self.plant, (effect,), (start,)))
@@ -414,6 +427,8 @@ class Fitter:
                 break
             used = estimate
             base = self.evidence.shift(self.plant, used.tolist())
+            # `used` tells the space how far the plant has moved already, so that the prior still
+            # pulls towards nominal and not towards the last estimate.
             space = Space(
                 self.evidence, with_values(base, fit.effects, fit.values), used, fit.effects
             )
@@ -436,6 +451,8 @@ class Fitter:
             for place, share in product(range(fitted), restarts):
                 perturbed = list(fit.values[number])
                 # Magnitudes are scaled about their nominal value, shapes and limits about 0.
+                # A limit's nominal value is practically infinite (`UNLIMITED`), so its distance
+                # from there has no meaning.
                 from_zero = place > 0 or effect.kind.name in LIMITS
                 nominal = (
                     0.0 if from_zero else effect.nominal(self.plant)[effect.kind.parameters[0]]
@@ -471,6 +488,8 @@ class Fitter:
         high: list[float] = []
         for effect in effects:
             allowed = [(quantity.low, quantity.high) for quantity in effect.quantities().values()]
+            # Some starts narrow the bounds to what the recording can show, such as a pitch within
+            # the stroke.
             observable = self.starts(effect).bounds or allowed
             low += [max(a[0], b[0]) for a, b in zip(allowed, observable, strict=True)]
             high += [min(a[1], b[1]) for a, b in zip(allowed, observable, strict=True)]
@@ -483,7 +502,7 @@ class Fitter:
         So does a guide whose fitted friction would drive the motion.
         """
         guides = {effect.group for effect in fit.effects if effect.of is Guide}
-        if not all(resists(getattr(fit.plant, name)) for name in guides):
+        if not all(resists(component_of(fit.plant, name, Guide)) for name in guides):
             return True
         low, high = self.bounds(fit.effects)
         values = np.concatenate([np.asarray(numbers) for numbers in fit.values])
@@ -532,6 +551,8 @@ class Fitter:
         def residual(vector: Array) -> Array:
             return self.evidence.residual(with_values(base, effects, split(vector)))
 
+        # The plant of the result is the nominal one with the effects, even where `base` has its
+        # tolerances moved: a finding is about effects alone.
         minimum = minimise(
             residual,
             space,

@@ -90,15 +90,16 @@ def minimise(
     Minimum
         Values from which no move gains enough to continue.
     """
-    low, high = bounds
-    values = np.clip(start, low, high)
+    values = np.clip(start, *bounds)
     current = residual(values)
     misfit = space.misfit(current)
     normal = np.eye(len(values))
     widening, shortening = 1.0, np.ones(len(values))
     for _ in range(ITERATIONS):
         factors = widening * shortening
-        jacobian = take_derivatives(residual, values, current, factors * steps, high) / factors
+        # Divided by the factors, the columns stay in units of the original steps, and so does the
+        # move.
+        jacobian = take_derivatives(residual, values, current, factors * steps, bounds[1]) / factors
         # The responses just taken shorten the steps of the next iteration.
         shortening = shorten(jacobian, misfit)
         normal, gradient = space.normal_equations(jacobian, current)
@@ -108,13 +109,10 @@ def minimise(
         enough, gained = max(LEAST_GAIN, LEAST_GAIN_SHARE * (misfit - expected)), 0.0
         # A quadratic misfit would fall by -g'm; a smaller promise is not worth a prediction.
         if -float(gradient @ move) >= enough:
-            for share in MOVE_SHARES:
-                moved = np.clip(values + share * move * steps, low, high)
-                tried = residual(moved)
-                if (value := space.misfit(tried)) < misfit:
-                    gained = misfit - value
-                    values, current, misfit = moved, tried, value
-                    break
+            improved = _try_move(residual, space, values, move, steps, bounds, misfit)
+            if improved is not None:
+                gained = misfit - improved[2]
+                values, current, misfit = improved
         if gained < enough:
             if widening == WIDENING or is_sufficient(misfit, expected):
                 break
@@ -122,6 +120,29 @@ def minimise(
     # The covariance of least squares with unit variance is the inverse of the normal matrix.
     widths = np.sqrt(np.maximum(np.diag(np.linalg.pinv(normal)), 0.0)) * steps
     return Minimum(values, misfit, widths)
+
+
+def _try_move(
+    residual: Callable[[Array], Array],
+    space: Space,
+    values: Array,
+    move: Array,
+    steps: Array,
+    bounds: tuple[Array, Array],
+    misfit: float,
+) -> tuple[Array, Array, float] | None:
+    """Return values, residual and misfit after a share of a move; None if none lowers the misfit.
+
+    `move` is in units of `steps`.
+    The first share that lowers the misfit is taken. An exact line search would cost more
+    predictions than the next iteration.
+    """
+    for share in MOVE_SHARES:
+        moved = np.clip(values + share * move * steps, *bounds)
+        tried = residual(moved)
+        if (value := space.misfit(tried)) < misfit:
+            return moved, tried, value
+    return None
 
 
 def is_sufficient(misfit: float, expected: float, ratio: float = SUFFICIENT_MISFIT) -> bool:
@@ -190,6 +211,8 @@ def take_derivatives(
     """
     columns = []
     for number, step in enumerate(steps):
+        # One-sided differences cost one prediction per parameter and central ones two. Their error
+        # slows the iteration; the misfit is exact in any case.
         sign = 1.0 if values[number] + step <= high[number] else -1.0
         shifted = values.copy()
         shifted[number] += sign * step

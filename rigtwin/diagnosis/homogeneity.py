@@ -140,7 +140,10 @@ def fit_trends(
         # A slope over a covariate that hardly varies would extrapolate.
         if np.ptp(covariate) <= 0.02 * np.max(np.abs(covariate)) or power == 0.0:
             continue
+        # The values need no centring: the centred covariate is orthogonal to every constant in the
+        # weighted scalar product.
         slope = float(weights @ (centred * values)) / power
+        # Rounding may make the difference slightly negative where the line explains everything.
         remaining = max(whole.statistic - slope**2 * power, 0.0)
         # The line uses two degrees of freedom.
         among = len(values) - 2

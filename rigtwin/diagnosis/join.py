@@ -14,11 +14,11 @@ from typing import TypeVar
 
 import numpy as np
 
-from rigtwin.components.plant import Plant
-from rigtwin.diagnosis.cross_validation import gap_level
+from rigtwin.components.plant import Plant, select
 from rigtwin.diagnosis.evidence import Evidence, relative_errors
-from rigtwin.diagnosis.finding import Answer, Finding, Gap, Interval, Step, Verdict
+from rigtwin.diagnosis.finding import Answer, Finding, Gap, Interval, Place, Step, Verdict
 from rigtwin.diagnosis.result import Diagnosis
+from rigtwin.diagnosis.shrinkage import gap_level
 from rigtwin.diagnosis.text import sentence
 from rigtwin.diagnosis.units import write
 from rigtwin.diagnosis.words import enumerate_words
@@ -53,25 +53,13 @@ def join(
     corrected = parts[0].corrected._replace(plant=_merge_plants(evidence.plant, parts))
     weights = _weights(parts)
     gap = _join_gaps(evidence, corrected.plant, answers, weights)
-    effects = tuple(
-        replace(effect, share=weight * effect.share)
-        for answer, weight in zip(answers, weights, strict=True)
-        for effect in answer.effects
-    )
-    where = sorted(
-        (
-            replace(place, share=weight * place.share)
-            for answer, weight in zip(answers, weights, strict=True)
-            for place in answer.where
-        ),
-        key=lambda place: -place.share,
-    )
+    effects, where = _join_effects(answers, weights), _join_places(answers, weights)
     verdict = _join_verdicts([answer.verdict for answer in answers], bool(effects))
     answer = Answer(
         verdict=verdict,
         sentence=sentence(verdict, effects, where, gap),
         effects=effects,
-        where=tuple(where),
+        where=where,
         gap=gap,
         ranking=tuple(_unique(answer.ranking[:RANKED] for answer in answers)),
         not_observable=tuple(_unique(answer.not_observable for answer in answers)),
@@ -92,6 +80,25 @@ def join(
     return Diagnosis(answer, evidence.machine, evidence, corrected, otherwise, held_out)
 
 
+def _join_effects(answers: Sequence[Answer], weights: Sequence[float]) -> tuple[Finding, ...]:
+    """Effects of all parts, with their shares of the machine's gap."""
+    return tuple(
+        replace(effect, share=weight * effect.share)
+        for answer, weight in zip(answers, weights, strict=True)
+        for effect in answer.effects
+    )
+
+
+def _join_places(answers: Sequence[Answer], weights: Sequence[float]) -> tuple[Place, ...]:
+    """Places of all parts with their shares of the machine's gap, the largest first."""
+    places = (
+        replace(place, share=weight * place.share)
+        for answer, weight in zip(answers, weights, strict=True)
+        for place in answer.where
+    )
+    return tuple(sorted(places, key=lambda place: -place.share))
+
+
 def _describe_shared_delay(effects: Sequence[Finding]) -> Iterator[str]:
     """Say where delays of several parts agree, as one delay of the computer would make them."""
     delays = {
@@ -99,6 +106,8 @@ def _describe_shared_delay(effects: Sequence[Finding]) -> Iterator[str]:
         for effect in effects
         if effect.name.kind == "delay"
     }
+    # Intervals of which every two overlap have a common point (Helly), between the largest low end
+    # and the smallest high end.
     low = max((delay.low for delay in delays.values()), default=0.0)
     high = min((delay.high for delay in delays.values()), default=0.0)
     if len(delays) > 1 and low <= high:
@@ -119,6 +128,7 @@ def _join_steps(answers: Sequence[Answer]) -> tuple[Step, ...]:
     chains = [answer.steps for answer in answers if answer.steps]
     if not chains:
         return ()
+    # Every chain begins with the nominal plant, and each signal belongs to one part.
     residual = {name: value for chain in chains for name, value in chain[0].residual.items()}
     joined = [replace(chains[0][0], residual=residual)]
     for chain in chains:
@@ -135,7 +145,7 @@ def _merge_plants(plant: Plant, parts: Sequence[Diagnosis]) -> Plant:
         name: component
         for part in parts
         for name, component in part.corrected.plant._asdict().items()
-        if component != getattr(plant, name)
+        if (component,) != select(plant, [name])
     }
     return plant._replace(**changed)
 

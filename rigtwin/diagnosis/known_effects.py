@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
-from pathlib import Path
+from dataclasses import replace
 
 import numpy as np
 
@@ -12,15 +11,13 @@ from rigtwin.components import Effect
 from rigtwin.components.library import find
 from rigtwin.components.plant import Plant
 from rigtwin.description.machine import Machine
-from rigtwin.description.mjcf import Change, write_mjcf
 from rigtwin.diagnosis.balance import balance_forces
+from rigtwin.diagnosis.effect_fit import EffectFit, FittedParameter
 from rigtwin.diagnosis.evidence import Evidence, relative_errors
-from rigtwin.diagnosis.fit import Fit, Values, clashes, is_possible, with_values
+from rigtwin.diagnosis.fit import Fit, clashes, is_possible, with_values
 from rigtwin.diagnosis.fitter import PERTURBATIONS, Fitter
 from rigtwin.diagnosis.gauss_newton import SUFFICIENT_MISFIT, take_derivatives
-from rigtwin.diagnosis.overlay import Overlay, overlay
 from rigtwin.errors import RigtwinError
-from rigtwin.files import forbid_overwriting
 from rigtwin.numerics.arrays import Array
 
 WIDTH = 1.96
@@ -39,113 +36,6 @@ SHARES = (1.0, 0.3)
 """Shares of the effects' separate values from which they are fitted together."""
 LINEAR = ("coulomb", "viscous", "offset", "stiffness", "mass", "armature")
 """Kinds of one parameter in which the forces along a given motion are linear."""
-
-
-@dataclass(frozen=True)
-class FittedParameter:
-    """One fitted value.
-
-    Attributes
-    ----------
-    name : str
-        Effect, and the parameter where the effect has several: `coulomb@elbow`.
-    value : float
-        Best value, in `unit`.
-    low, high : float
-        Ends of the 95 % interval, in `unit`. It assumes that the model is right but for these
-        effects.
-    nominal : float
-        Value of the description, in `unit`.
-    unit : str
-        Unit of the values.
-    """
-
-    name: str
-    value: float
-    low: float
-    high: float
-    nominal: float
-    unit: str
-
-
-@dataclass(frozen=True)
-class EffectFit:
-    """Effects fitted to recordings.
-
-    Attributes
-    ----------
-    effects : tuple of Effect
-        Fitted effects.
-    values : tuple of tuple of float
-        Values of each effect, in the order of its parameters.
-    parameters : tuple of FittedParameter
-        The same values with names, intervals and units.
-    covariance : Array
-        Covariance of the values, shape (parameters, parameters).
-    error_before, error_after : tuple of float
-        Residual of each recording that was fitted, as a share of its signals' swing.
-    held_out_before, held_out_after : tuple of float
-        The same of each held-out recording.
-    warnings : tuple of str
-        Reasons to doubt a value: bounds, flat directions, several optima.
-    machine : Machine
-        The corrected machine.
-    """
-
-    effects: tuple[Effect, ...]
-    values: Values
-    parameters: tuple[FittedParameter, ...]
-    covariance: Array = field(repr=False)
-    error_before: tuple[float, ...]
-    error_after: tuple[float, ...]
-    held_out_before: tuple[float, ...]
-    held_out_after: tuple[float, ...]
-    warnings: tuple[str, ...]
-    machine: Machine = field(repr=False)
-    described: Machine = field(repr=False)
-    evidence: Evidence = field(repr=False)
-    held_out: Evidence | None = field(repr=False)
-
-    def __getitem__(self, name: str) -> FittedParameter:
-        """Return the parameter of a name."""
-        for parameter in self.parameters:
-            if parameter.name == name:
-                return parameter
-        raise KeyError(f"{name!r}; there are {', '.join(p.name for p in self.parameters)}")
-
-    @property
-    def correlation(self) -> Array:
-        """Correlation of the values, shape (parameters, parameters)."""
-        deviations = np.sqrt(np.maximum(np.diag(self.covariance), 1e-300))
-        return self.covariance / np.outer(deviations, deviations)
-
-    def overlays(self) -> tuple[Overlay, ...]:
-        """Return every observed signal as measured, as nominal and as corrected."""
-        return overlay(self.evidence, self.machine.plant, self.held_out)
-
-    def save_mjcf(self, path: str | Path) -> tuple[str, ...]:
-        """Write the machine's MJCF with the fitted values.
-
-        Parameters
-        ----------
-        path
-            New file; meshes and included files are looked for beside it.
-
-        Returns
-        -------
-        tuple of str
-            A line for each value that MJCF has no attribute for.
-        """
-        changes = [
-            Change(p.name.partition("@")[2].partition(" ")[0], _parameter(p.name), p.value)
-            for p in self.parameters
-        ]
-        return write_mjcf(forbid_overwriting(path, *self.described.files), self.described, changes)
-
-
-def _parameter(name: str) -> str:
-    effect, _, parameter = name.partition(" ")
-    return parameter or effect.partition("@")[0]
 
 
 def find_effects(machine: Machine, names: Sequence[str]) -> tuple[Effect, ...]:
@@ -202,30 +92,9 @@ def fit_effects(
         For no effect, or one that cannot act on this machine together with the others.
     """
     effects = tuple(effects)
-    if not effects:
-        possible = ", ".join(effect.name for effect in evidence.machine.effects())
-        raise RigtwinError(f"no effect to fit; expected some of {possible}")
-    if not is_possible(effects, evidence.plant):
-        names = ", ".join(effect.name for effect in effects)
-        raise RigtwinError(
-            f"{names}: an effect lacks what it acts through, as play lacks dry friction"
-        )
+    _require_possible(evidence, effects)
     exact = Fitter(evidence)
-    thinned = evidence.thin().halve_steps()
-    # A model that integrates nothing has nothing coarser.
-    coarse = exact if thinned.models == evidence.models else Fitter(thinned)
-    optima: list[Fit] = []
-    for start in _list_starts(coarse, effects, progress):
-        optima.append(coarse.refine(effects, start))
-        progress(1)
-        if _is_settled(coarse, optima):
-            break
-    settled = _is_settled(coarse, optima)
-    optima.sort(key=lambda fit: fit.misfit)
-    # A settled optimum needs no further starts nearby.
-    restarts = () if settled else PERTURBATIONS
-    fit = exact.refit_with_tolerances(optima[0], restarts)
-    progress(1)
+    fit, optima = _fit_jointly(exact, effects, progress)
     covariance = _find_covariance(exact, fit)
     parameters = _list_parameters(evidence.machine, fit, covariance)
     plant = with_values(evidence.plant, effects, fit.values)
@@ -244,6 +113,52 @@ def fit_effects(
         evidence=evidence,
         held_out=held_out,
     )
+
+
+def _fit_jointly(
+    exact: Fitter, effects: tuple[Effect, ...], progress: Callable[[int], object]
+) -> tuple[Fit, list[Fit]]:
+    """Fit effects on coarse evidence from several starts, and the best optimum on all of it.
+
+    Returns the precise fit, and the coarse optima, the best first.
+    """
+    evidence = exact.evidence
+    thinned = evidence.thin().halve_steps()
+    # A model that integrates nothing has nothing coarser.
+    coarse = exact if thinned.models == evidence.models else Fitter(thinned)
+    optima = _find_optima(coarse, effects, progress)
+    # Asked before sorting: the first start is the one that the others are compared with.
+    settled = _is_settled(coarse, optima)
+    optima.sort(key=lambda fit: fit.misfit)
+    # A settled optimum needs no further starts nearby.
+    fit = exact.refit_with_tolerances(optima[0], () if settled else PERTURBATIONS)
+    progress(1)
+    return fit, optima
+
+
+def _require_possible(evidence: Evidence, effects: tuple[Effect, ...]) -> None:
+    """Raise RigtwinError unless there are effects, and each has what it acts through."""
+    if not effects:
+        possible = ", ".join(effect.name for effect in evidence.machine.effects())
+        raise RigtwinError(f"no effect to fit; expected some of {possible}")
+    if not is_possible(effects, evidence.plant):
+        names = ", ".join(effect.name for effect in effects)
+        raise RigtwinError(
+            f"{names}: an effect lacks what it acts through, as play lacks dry friction"
+        )
+
+
+def _find_optima(
+    fitter: Fitter, effects: tuple[Effect, ...], progress: Callable[[int], object]
+) -> list[Fit]:
+    """Fit from one start after another, until no further start can find another optimum."""
+    optima: list[Fit] = []
+    for start in _list_starts(fitter, effects, progress):
+        optima.append(fitter.refine(effects, start))
+        progress(1)
+        if _is_settled(fitter, optima):
+            break
+    return optima
 
 
 def _errors(evidence: Evidence | None, plant: Plant) -> tuple[float, ...]:
@@ -280,6 +195,7 @@ def _list_starts(
     ]
     if len(alone) > 1:
         starts.append(_start_in_turn(fitter, effects, alone, values))
+    # `fit_one` has refined a single effect from all its starts already.
     return starts if len(effects) > 1 else starts[:1]
 
 
@@ -292,6 +208,7 @@ def _is_settled(fitter: Fitter, optima: Sequence[Fit]) -> bool:
     first, expected = optima[0], fitter.evidence.expected
     if any(effect.kind.name not in LINEAR for effect in first.effects):
         return False
+    # No other optimum can be better by more than noise.
     if first.misfit < SUFFICIENT_MISFIT * expected:
         return True
     excess = max(first.misfit / expected, 1.0)
@@ -326,6 +243,8 @@ def _start_in_turn(
     values: list[tuple[float, ...]],
 ) -> list[tuple[float, ...]]:
     """Return the fit that adds one effect after another, the one that explains most first."""
+    # Small starts of the later effects leave most of the data to the effect that explained most by
+    # itself.
     order = sorted(alone, key=lambda effect: alone[effect].misfit)
     fit = alone[order[0]]
     for effect in order[1:]:
@@ -367,10 +286,12 @@ def _invert(normal: Array, steps: Array, ranges: Array) -> Array:
     A direction that the data say nothing about gets the variance of the whole range instead of
     none, as a pseudo-inverse would give it.
     """
+    # The information per squared step that corresponds to a standard deviation of the whole range.
     least = (steps / ranges) ** 2
     scale = np.sqrt(np.maximum(np.diag(normal), least))
     eigenvalues, vectors = np.linalg.eigh(normal / np.outer(scale, scale))
     inverse = (vectors / np.maximum(eigenvalues, SINGULAR)) @ vectors.T
+    # The deviations are limited to the ranges, and the correlations of the inverse stay.
     widest = np.minimum(np.sqrt(np.diag(inverse)) * steps / scale, ranges)
     sizes = np.sqrt(np.diag(inverse))
     return inverse / np.outer(sizes, sizes) * np.outer(widest, widest)
@@ -383,6 +304,8 @@ def _list_parameters(machine: Machine, fit: Fit, covariance: Array) -> tuple[Fit
         nominal = effect.nominal(machine.plant)
         quantities = effect.quantities()
         for name, value in zip(effect.kind.parameters, values, strict=True):
+            # The length of the list is the index of the next value in the flat order of the
+            # covariance.
             half = WIDTH * float(deviations[len(parameters)])
             quantity = quantities[name]
             parameters.append(
@@ -415,6 +338,8 @@ def _find_doubts(
         if p.low <= p.nominal <= p.high
     ]
     deviations = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+    # An eigenvector of a small eigenvalue of the correlation matrix is a combination that the data
+    # determine, although they determine none of its members.
     eigenvalues, vectors = np.linalg.eigh(covariance / np.outer(deviations, deviations))
     for eigenvalue, vector in zip(eigenvalues, vectors.T, strict=True):
         members = [

@@ -44,6 +44,8 @@ def steps(evidence: Evidence, chain: Sequence[Fit], held_out: Evidence) -> tuple
         removed = " and ".join(sorted(previous - names))
         values: dict[str, Estimate] = {}
         for effect, numbers in zip(fit.effects, fit.values, strict=True):
+            # Only what is new at this stage: values of earlier effects move a little, and would
+            # repeat in every row.
             if effect.name in previous:
                 continue
             nominal = effect.nominal(evidence.plant)
@@ -117,6 +119,8 @@ def leftovers(
     differences = evidence.differences(plant)
     levels = remaining_rms(evidence, plant)
     places = []
+    # Signals of different units add in units of their noise. That of the first recording stands for
+    # all, as it belongs to the sensor.
     total = sum(
         (levels[name] / float(evidence.lines[0].noise[n])) ** 2
         for n, name in enumerate(evidence.names)

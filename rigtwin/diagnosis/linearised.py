@@ -36,6 +36,7 @@ class Linearised:
     def __init__(self, fitter: Fitter, fit: Fit) -> None:
         self._fitter, self._fit = fitter, fit
         self._sizes = [len(effect.kind.parameters) for effect in fit.effects]
+        # Number of the effect that each parameter of the flat vector belongs to.
         self._owner = np.repeat(np.arange(len(self._sizes)), self._sizes)
         self._steps = np.concatenate([fitter.starts(effect).steps for effect in fit.effects])
         self._values = np.concatenate([np.asarray(values, float) for values in fit.values])
@@ -50,6 +51,7 @@ class Linearised:
             residual, self._values, self._residual, self._steps, self._bounds[1]
         )
         normal, self._gradient = fitter.space.normal_equations(self._jacobian, self._residual)
+        # The same damping as in the fit keeps the matrix regular where a parameter has no response.
         self._normal = normal + np.diag(DAMPING * np.diag(normal) + 1e-12)
 
     def _split(self, vector: Array) -> Values:
@@ -108,6 +110,8 @@ class Linearised:
         free = np.isin(self._owner, subset)
         right = self._gradient[free] + self._normal[np.ix_(free, ~free)] @ move[~free]
         move[free] = -np.linalg.solve(self._normal[np.ix_(free, free)], right)
+        # The linear prediction suffices to rank subsets, and costs no simulation. The best of them
+        # are fitted from these values, which therefore have to be within their bounds.
         misfit = self._fitter.space.misfit(self._residual + self._jacobian @ move)
         values = self._split(np.clip(self._values + move * self._steps, *self._bounds))
         return misfit, tuple(values[number] for number in subset)

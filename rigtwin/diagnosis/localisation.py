@@ -58,6 +58,8 @@ def distance_since_reversal(position: Array) -> Array:
     """
     least = TURNED * float(np.ptp(position))
     distance = np.empty(len(position))
+    # `base` is the last turning point, and `extreme` the furthest position since, which becomes the
+    # next turning point once the motion has come back from it.
     base = extreme = float(position[0])
     turn, rising = 0, True
     for tick, current in enumerate(position.tolist()):
@@ -94,11 +96,15 @@ def region(difference: Array, motion: Motion, period: float, unit: str = "m") ->
     total = float(np.sum(power))
     if total <= 0.0:
         return "throughout"
+    # Growth is asked for first: a twin that diverges would otherwise be located in the last stretch
+    # of time.
     third = len(power) // 3
     if third and float(np.sum(power[-third:])) > GROWS * float(np.sum(power[:third])):
         return "growing with time"
     best, name = 0.0, "throughout"
     for label, inside, factor in _regions(power, motion, period, unit):
+        # The concentration is the power density inside relative to the average; 1 for power that is
+        # spread evenly over time.
         share = float(np.sum(power[inside])) / total
         concentration = share / max(float(np.mean(inside)), 1e-9)
         threshold = CONCENTRATED * factor
@@ -112,10 +118,13 @@ def _regions(
 ) -> list[tuple[str, NDArray[np.bool_], float]]:
     """Label, ticks and threshold factor of every region; the first of equals is preferred."""
     speed, force = motion.speed, motion.force
+    # The speed limits are relative, and a component that never moves has no speed to relate them
+    # to.
     typical = float(np.sqrt(np.mean(speed**2))) or 1.0
     swing = force - np.mean(force)
     still = np.abs(speed) < STANDSTILL * typical
     length = max(1, round(REST / period))
+    # All of the `length` ticks about one must be still. The sum is a float, hence the half.
     rest = np.convolve(still, np.ones(length), mode="same") >= length - 0.5
     regions: list[tuple[str, NDArray[np.bool_], float]] = [
         ("at rest", rest, 1.0),
@@ -132,6 +141,8 @@ def _regions(
     # Play and compliance act over a distance after each reversal, at whatever speed that is passed.
     distance = distance_since_reversal(motion.position)
     order = np.argsort(distance)
+    # With the ticks in the order of their distance, this is the distance within which `MOST` of the
+    # power lies.
     last = np.searchsorted(np.cumsum(power[order]), MOST * float(np.sum(power)))
     reach = np.sort(distance)[last.clip(0, len(power) - 1)]
     factor, shown = find_unit(unit, float(reach))
@@ -186,6 +197,7 @@ def locate(
         Frequencies and operating region of the difference.
     """
     noise = evidence.lines[0].noise
+    # The sensors' noise makes signals of different units comparable.
     power = [
         sum(float(np.mean(d[row] ** 2)) for d in differences) / noise[row] ** 2
         for row in range(len(noise))

@@ -62,10 +62,13 @@ def propose_test(
 def _smallest_distance(machine: Machine, fits: Sequence[Fit], test: Experiment) -> float:
     """Smallest χ² between the prediction of the first explanation and that of another."""
     configuration = test.configuration
+    # Every test of the menu is simulated, so long ones are cut.
     timing = configuration.timing._replace(duration=min(configuration.timing.duration, LONGEST))
     twin = configuration._replace(plant=fits[0].plant, timing=timing)
     demands = test.demands(twin, SEED)
     recording = machine.physics.simulate(machine, test.name, twin, demands, SEED)
+    # Tests are weighed like real recordings, so a difference that drowns in noise or declared error
+    # separates nothing.
     evidence = Evidence(machine, [recording], [twin])
     space = Space(evidence, fits[0].plant)
     reference = evidence.predict(fits[0].plant)
@@ -73,5 +76,6 @@ def _smallest_distance(machine: Machine, fits: Sequence[Fit], test: Experiment) 
     for fit in fits[1:]:
         predicted = evidence.predict(fit.plant)
         difference = [a - b for a, b in zip(reference, predicted, strict=True)]
+        # What the tolerances can make up for is no difference that a test could show.
         distances.append(space.misfit(evidence.whiten(difference)))
     return min(distances)

@@ -54,6 +54,7 @@ def deviance(levels: Array, pieces: Array, samples: Array, within: float) -> flo
     float
         Sum over all bands, dimensionless.
     """
+    # log1p is precise also for an excess far below 1.
     narrow = samples / np.maximum(pieces, 1e-300)
     excess = np.maximum(levels - 1.0, 0.0)
     return float(np.sum(pieces * (within * np.minimum(levels, 1.0) + np.log1p(excess * narrow))))
@@ -118,6 +119,7 @@ class HypothesisPosterior:
         )
         self._noise, self._pieces = 1.0 + reference.excess, reference.pieces
         samples, signals = float(np.sum(self._pieces)), self._pieces.shape[1]
+        # Of a power q > 1 noise and declared error explain 1 / q.
         beyond = 1.0 - 1.0 / np.maximum(self.levels(reference), 1.0)
         self.discrepancy = float(np.sum(self._pieces * beyond) / samples)
         self.temper = (
@@ -178,6 +180,8 @@ class HypothesisPosterior:
         least = min(costs)
         # Costs are taken relative to the least one, and capped, so that exp cannot underflow to an
         # empty sum.
+        # The cap also turns the infinite cost of a bounded hypothesis into a weight of e^-700,
+        # which is none.
         raw = [math.exp(-min((cost - least) / self.temper, 700.0)) for cost in costs]
         total = sum(raw)
         weighted = [
@@ -212,6 +216,8 @@ class HypothesisPosterior:
         float
             Difference of the costs, at most 1e6.
         """
+        # Without the effect its rival would take the place, so the margin would only say how close
+        # the rival is.
         excluded = {effect, *self.rivals(effect)}
         costs = [
             hypothesis.cost
@@ -246,6 +252,8 @@ class HypothesisPosterior:
             fit = hypothesis.scored.fit
             if {effect, *contested} <= {*fit.effects}:
                 values = fit.values[fit.effects.index(effect)]
+                # Squares about the best values and not about their mean, so that the bias of the
+                # best hypothesis is contained.
                 variance += hypothesis.weight * (np.array(values) - chosen) ** 2
                 weight += hypothesis.weight
         return tuple(np.sqrt(variance / weight).tolist())
@@ -264,6 +272,8 @@ class HypothesisPosterior:
             exchanged = members - common
             if hypothesis.weight < least or len(exchanged) != 1:
                 continue
+            # Exactly one effect beside the common ones: the hypothesis exchanges the effect and
+            # adds none.
             (candidate,) = exchanged
             if candidate != effect and common <= members:
                 rivals.append(candidate)

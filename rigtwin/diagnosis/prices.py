@@ -144,6 +144,7 @@ class Prices:
         for first in range(len(absent)):
             for second in range(first):
                 if absent[first] and absent[second]:
+                    # 1 for effects that do not oppose each other, and 0 for two that cancel.
                     joint = scored.together[first, second]
                     # The price rises linearly from the threshold to its half.
                     lacking = (t.cancelling_share - joint) / (0.5 * t.cancelling_share)
@@ -174,6 +175,8 @@ class Prices:
         unsteady_price (4 - z)^2 for z < 4. It is steeper once the interval of 2.5 standard errors
         contains the nominal value.
         """
+        # The price is continuous in the standard errors: with a threshold, a small change of the
+        # data could exchange the best hypothesis.
         t, evidence, price = self._thresholds, self._fitter.evidence, 0.0
         for effect, values, widths in zip(
             scored.fit.effects, scored.fit.values, scored.widths, strict=True

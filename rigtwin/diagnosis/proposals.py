@@ -113,6 +113,8 @@ def propose_additions(
             return None
         promised = first.misfit - gain
         start = fitter.scale_start(effect, starts[best], float(share[best]))
+        # At unit length the scalar product of two responses is the cosine between them
+        # (`choose_distinct`).
         response = responses[best] / max(float(np.linalg.norm(responses[best])), 1e-30)
         extended, values = (*first.effects, effect), (*first.values, *start)
         return Proposal(promised, extended, values, space, response)
@@ -182,6 +184,8 @@ def propose_replacements(
         def resemble(
             candidate: Effect, targets: tuple[Array, ...] = targets
         ) -> tuple[float, Effect, tuple[float, ...]]:
+            # The difference of the two targets is the size of the change: an effect may be imitated
+            # as a whole, or only in small changes about its fitted value.
             whole, local = (_resemble(fitter, fit, candidate, target) for target in targets)
             return whole if whole[0] >= local[0] else local
 
@@ -221,6 +225,7 @@ def _local_response(fitter: Fitter, fit: Fit, number: int, residual: Array) -> A
     for place, name in enumerate(names):
         nearer[place] += SMALL_PART * (nominal[name] - nearer[place])
     values[number] = tuple(nearer)
+    # Only magnitudes go back towards nominal. The shapes of an absent effect have no meaning.
     moved = fitter.evidence.residual(with_values(fitter.plant, fit.effects, values))
     return (moved - residual) / SMALL_PART
 
@@ -239,6 +244,8 @@ def _resemble(
     projected = space.project_out(both)
     shapes, target = projected[:, :-1], projected[:, -1]
     along, power = shapes.T @ target, np.maximum(np.sum(shapes**2, axis=0), 1e-100)
+    # The sign is kept until the square is taken: an opposed response has no start that imitates the
+    # other.
     cosines = np.maximum(along, 0.0) ** 2 / (power * float(target @ target) + 1e-300)
     best = int(np.argmax(cosines))
     share = min(float(along[best] / power[best]), LARGEST_SHARE)

@@ -106,6 +106,7 @@ def fit_together(
         values = [value for value in fitter.starts(effect).values if value[0] > 0.0]
         return values[min(number, len(values) - 1)]
 
+    # Every joint fit of many effects is slow, so only one size is tried.
     count = GATEWAY_STARTS if len(chosen) <= FEW_REGULAR else 1
     starts: list[Values] = [
         tuple(choose_start(effect, number) for effect in chosen) for number in range(count)

@@ -132,6 +132,8 @@ def headlines(overlays: Sequence[Overlay], corrected: bool) -> list[str]:
     )
     beyond = [_beyond_noise(each) for each in counted]
     worst = int(np.argmax(beyond))
+    # The same sensor in the other recordings is the reference, as sensors differ in their share of
+    # noise.
     same_sensor = [
         error
         for each, error in zip(counted, beyond, strict=True)

@@ -71,7 +71,11 @@ def combine_residuals(
     outputs: dict[str, Residual], differences: dict[str, Array], period: float
 ) -> Residual:
     """Several outputs as one, each in units of its own noise floor."""
+    # Root mean square of the ratios: in units of their noise floors, outputs of different units
+    # add.
     ratio = math.hypot(*(output.ratio for output in outputs.values())) / math.sqrt(len(outputs))
+    # The band is that of the output with the largest ratio, since spectra of different units cannot
+    # be added.
     loudest = max(outputs, key=lambda name: outputs[name].ratio)
     return Residual(ratio, 1.0, ratio, "1", band(differences[loudest], period), outputs)
 
@@ -90,6 +94,7 @@ def rounding(recorded: Array) -> float:
         q / sqrt(12), where q is the last stored digit of the largest value; 1e-12 for a column of
         zeros.
     """
+    # Smaller values are stored with smaller steps, so the largest one gives an upper bound.
     largest = float(np.max(np.abs(recorded)))
     # Eight digits below that the smallest numbers of a computer begin.
     if largest < 1e-290:

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from rigtwin.components import with_parameters
 from rigtwin.components.effect import GROUPS
+from rigtwin.components.plant import select, with_parameters
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Machine
 from rigtwin.description.mjcf import Change, write_mjcf
@@ -16,7 +16,8 @@ from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.finding import Answer, Finding, Gap, Place, Verdict
 from rigtwin.diagnosis.fit import Fit
 from rigtwin.diagnosis.overlay import Overlay, overlay
-from rigtwin.diagnosis.pictures import Picture, picture
+from rigtwin.diagnosis.picture import Picture
+from rigtwin.diagnosis.pictures import picture
 from rigtwin.files import forbid_overwriting
 
 
@@ -80,7 +81,10 @@ class Diagnosis:
         plant = self.corrected.plant
         for effect in self.effects:
             group = GROUPS.get(effect.name.component, "")
-            if group and all(name in getattr(plant, group)._fields for name in effect.parameters):
+            if not group:
+                continue
+            (component,) = select(plant, [group])
+            if all(name in component._fields for name in effect.parameters):
                 # Delays and missed ticks of the computer are read off the controller's commands, so
                 # `corrected` lacks them; the twin needs them as much as the plant's defects.
                 values = {name: estimate.value for name, estimate in effect.parameters.items()}
@@ -120,6 +124,7 @@ class Diagnosis:
             One picture per effect, of held-out recordings if there are any. Empty where the data
             cannot be diagnosed.
         """
+        # What the correction was not fitted to is the stronger demonstration.
         shown = self.held_out or self.evidence
         if shown is None:
             return ()

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigtwin.components import measures
-from rigtwin.components.plant import Plant
+from rigtwin.components.plant import Plant, parameter_of
+from rigtwin.components.sensors import sensor_of
 from rigtwin.description.machine import Machine
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
@@ -107,22 +107,11 @@ def find_outstanding(
     tuple of SensorProperty
         Outstanding properties.
     """
-    table: dict[str, dict[str, float]] = {}
-    for number, row in enumerate(machine.rows):
-        sensor = getattr(plant, row.name, None)
-        if sensor is None or not measures(sensor) or sensor.white == 0.0:
-            continue
-        by_recording = [
-            properties(r.column(*row.channel), rows[number], r.period, plant.mains.frequency)
-            for r, rows in zip(recordings, predicted, strict=True)
-        ]
-        table[row.name] = {
-            key: float(np.median([part[key] for part in by_recording])) for key in PROPERTIES
-        }
+    table = _properties_by_sensor(machine, recordings, predicted, plant)
     possible = {effect.name for effect in machine.effects()}
     outstanding: list[SensorProperty] = []
     for parameter, kind in PROPERTIES.items():
-        nominal = {name: float(getattr(getattr(plant, name), parameter)) for name in table}
+        nominal = {name: parameter_of(plant, name, parameter) for name in table}
         # A sensor whose nominal value is 0 cannot have this property.
         ratios = {
             name: values[parameter] / nominal[name] if nominal[name] > 0.0 else 0.0
@@ -131,14 +120,7 @@ def find_outstanding(
         for name, ratio in ratios.items():
             if f"{kind}@{name}" not in possible:
                 continue
-            # Only the larger of noise and bit is observable: noise hides a smaller bit, and a bit
-            # hides smaller noise.
-            if kind == "quantisation" and table[name]["resolution"] < table[name]["white"]:
-                continue
-            if kind == "noise" and table[name]["resolution"] > table[name]["white"]:
-                continue
-            # A hum smaller than the bit may appear as anything from 0 to one bit.
-            if kind == "hum" and table[name]["resolution"] > table[name]["hum"]:
+            if _is_hidden(kind, table[name]):
                 continue
             # A single sensor is compared with its nominal value alone.
             references = [value for key, value in ratios.items() if key != name] or [1.0]
@@ -146,3 +128,37 @@ def find_outstanding(
                 value = table[name][parameter]
                 outstanding.append(SensorProperty(name, kind, parameter, value, nominal[name]))
     return tuple(outstanding)
+
+
+def _properties_by_sensor(
+    machine: Machine, recordings: Sequence[Recording], predicted: Sequence[Array], plant: Plant
+) -> dict[str, dict[str, float]]:
+    """Return the properties of each sensor with declared noise, over all recordings."""
+    table: dict[str, dict[str, float]] = {}
+    for number, row in enumerate(machine.rows):
+        component = machine.components.get(row.name)
+        if component is None or not component.quantity:
+            continue
+        if sensor_of(plant, row.name).white == 0.0:
+            continue
+        by_recording = [
+            properties(r.column(*row.channel), rows[number], r.period, plant.mains.frequency)
+            for r, rows in zip(recordings, predicted, strict=True)
+        ]
+        # The median over recordings ignores a single one that was disturbed.
+        table[row.name] = {
+            key: float(np.median([part[key] for part in by_recording])) for key in PROPERTIES
+        }
+    return table
+
+
+def _is_hidden(kind: str, measured: dict[str, float]) -> bool:
+    """Return whether a larger property of the same sensor hides the one of this kind."""
+    # Only the larger of noise and bit is observable: noise hides a smaller bit, and a bit hides
+    # smaller noise.
+    if kind == "quantisation":
+        return measured["resolution"] < measured["white"]
+    if kind == "noise":
+        return measured["resolution"] > measured["white"]
+    # A hum smaller than the bit may appear as anything from 0 to one bit.
+    return measured["resolution"] > measured["hum"]

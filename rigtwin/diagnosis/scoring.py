@@ -129,6 +129,7 @@ class Scorer:
         Scored
             The fit with the power of its residual on held-out data.
         """
+        # Equal values with other tolerances leave another residual.
         key = (fit.effects, fit.values, fit.used)
         if key not in self._cache:
             self._cache[key] = self._score(fit)
@@ -162,12 +163,16 @@ class Scorer:
         estimate = space.estimate_tolerances(residual + space.columns @ used)
         free = np.abs(estimate) < BOUND
         residual = residual + space.columns @ (used - estimate)
+        # Replaced tolerances have columns of zeros (`Space`) and are no parameters of this fit.
         free &= np.any(space.columns != 0.0, axis=0)
         # One stack of J (effects, then tolerances) and r gives all products at once.
+        # `take_derivatives` gives changes of the residual, measured minus predicted, and
+        # `Space.columns` changes of the prediction: hence the minus sign.
         stack = np.column_stack([columns, -space.columns[:, free], residual])
         products, expected = block_products(evidence, stack)
         prior = np.concatenate([np.zeros(count), np.full(int(free.sum()), PRIOR)])
         samples = self._samples
+        # All gradients are halves: J'r and PRIOR t are those of |r|²/2 and PRIOR |t|²/2.
         levels, inside = _cross_validate(
             products, expected, prior, prior * _pad(estimate[free], count)
         )
@@ -226,6 +231,7 @@ class Scorer:
     def _rest(self, products: Array, expected: Array) -> Array:
         """Return each signal's residual beyond noise and declared error, as a share of all
         signals' amplitude."""
+        # The last row and column of the products is the residual's own power.
         beyond = products[..., -1, -1].sum(axis=(0, 2, 3)) - expected.sum(axis=(0, 2, 3))
         return np.asarray(np.sqrt(np.maximum(beyond, 0.0) / self._signal_power))
 
@@ -251,6 +257,8 @@ def _reach(moves: Array, products: Array) -> Array:
     """Return the share of each signal in the response to each effect, shape (effects, signals)."""
     count = len(moves)
     signals = products.sum(axis=(0, 2, 3))[:, :count, :count]
+    # The diagonal of M' G_s M for each signal s, with the products G_s of the jacobian: the power
+    # of an effect's response in that signal alone.
     power = np.einsum("pe,spq,qe->es", moves, signals, moves)
     return np.asarray(power / np.maximum(power.sum(axis=1, keepdims=True), TINY))
 
@@ -305,6 +313,8 @@ def _cross_validate(
     if count:
         blocks, slopes = normal.sum(axis=(1, 2)), gradient.sum(axis=(1, 2))
         whole, right = blocks.sum(axis=(0, 1)), slopes.sum(axis=(0, 1))
+        # A parameter without response, or with none in the remaining blocks, would make the matrix
+        # singular.
         ridge = np.diag(prior + RIDGE * np.diag(whole) + 1e-12)
         # The move that all data ask for is subtracted from that of each fold. It is not 0 where the
         # residual is discontinuous, as at a stick: such a fit is no stationary point of its
@@ -320,6 +330,7 @@ def _cross_validate(
             held_out[places] = changed[places]
     total = expected.sum(axis=3)
     inverse = np.where(total > 0.0, 1.0 / np.maximum(total, TINY), 0.0)
+    # The power of a single fold is a quadratic form, which rounding may make slightly negative.
     return np.maximum(held_out.sum(axis=3), 0.0) * inverse, power.sum(axis=3) * inverse
 
 
@@ -345,5 +356,7 @@ def _standard_errors(products: Array, expected: Array, prior: Array, count: int)
     spread = scores.T @ scores * blocks / max(blocks - columns, 1)
     sandwich = inverse @ spread @ inverse
     excess = max(float(products[..., columns, columns].sum() / max(expected.sum(), TINY)), 1.0)
+    # The sandwich scatters where there are few blocks, and the formal variance ignores correlation.
+    # The larger one is the safer one.
     variance = np.maximum(np.diag(sandwich), np.diag(excess * inverse))[:count]
     return np.asarray(np.sqrt(np.maximum(variance, 0.0)))

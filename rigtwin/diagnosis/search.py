@@ -159,6 +159,7 @@ class HypothesisSearch:
     def _fit_singles(self) -> list[Fit]:
         """Fit the nominal plant and each promising effect alone, the best fit first."""
         self.screened = self.threads.map(self.coarse.screen, self.effects)
+        # The empty hypothesis comes first: the posterior and its prices refer to it.
         self._add([self.fine.refit_with_tolerances(self.fine.nominal_fit)])
         # Prices are in nats; a chi-square is twice as large.
         price = 2.0 * self.posterior.prices.ordinary
@@ -213,6 +214,8 @@ class HypothesisSearch:
         """Score fits, and keep the fit of least misfit for each set of effects."""
         for scored in self.threads.spread(self._scorer.score, fits):
             key = frozenset(scored.fit.effects)
+            # One set of effects may be fitted from many starts. Only its best minimum is a
+            # hypothesis; several would share the weight of one.
             known = self.pool.get(key)
             if known is None or scored.fit.misfit < known.fit.misfit:
                 self.pool[key] = scored
@@ -273,6 +276,8 @@ class HypothesisSearch:
         # The closest fit is a leader even if its effects are not worth their price yet: the next
         # effect may make them so.
         closest = sorted(near, key=lambda fit: fit.misfit)
+        # The order is that in which they are tried: the best, the closest, further ones, and one
+        # with dry friction.
         leaders = (ranked[0], *closest[:1], *near[: self.thresholds.leaders], *dry[:1])
         for fit in leaders:
             if frozenset(fit.effects) not in self._extended:
@@ -326,6 +331,8 @@ class HypothesisSearch:
         """Look for rivals of the best hypothesis, until it stays the best."""
         best_fit = self.posterior.best.fit
         self._keep(self._refine(start_unfolded(self.coarse, best_fit, self.effects)))
+        # The same hypothesis may win again after another one was the best, so the loop needs a
+        # memory to end.
         varied: set[frozenset[Effect]] = set()
         while len(best := self.posterior.best.fit.effects) > 1 and frozenset(best) not in varied:
             varied.add(frozenset(best))
@@ -333,6 +340,8 @@ class HypothesisSearch:
 
     def _refine(self, starts: Sequence[Start]) -> list[Fit]:
         """Fit from the starts that were not fitted before."""
+        # `dict.fromkeys` keeps the order, which a set would not: the same data must give the same
+        # answer.
         fresh = [start for start in dict.fromkeys(starts) if start not in self._started]
         self._started.update(fresh)
         return self.threads.map(lambda start: self.coarse.refine(*start), fresh)
@@ -343,11 +352,13 @@ class HypothesisSearch:
             return
         price = 2.0 * self.posterior.prices.ordinary
         distinct: dict[frozenset[Effect], Fit] = {}
+        # Sorted by misfit plus price, the first fit of each set is its best one.
         for fit in sorted(fits, key=lambda fit: fit.misfit + price * len(fit.effects)):
             distinct.setdefault(frozenset(fit.effects), fit)
         ranked = list(distinct.values())[: SCORED * PRECISE]
         best = self.posterior.best.fit
         hopeless = best.misfit + MISSED * price
+        # As long as the nominal plant is the best hypothesis, no fit is hopeless.
         near = [fit for fit in ranked[:PRECISE] if fit.misfit <= hopeless or not best.effects]
         self._settle(near)
         self._add([fit for fit in ranked if fit not in near])

@@ -73,6 +73,7 @@ class Space:
         fixed = self._is_replaced(effects)
         # A column of zeros keeps the positions of the tolerances; its estimate is 0.
         self._columns = np.where(fixed, 0.0, self._responses) if any(fixed) else self._responses
+        # r + C u is the residual with the tolerances back at nominal, from which the prior counts.
         self._absorbed = self._columns @ self._used
         self._normal = self._columns.T @ self._columns + PRIOR * np.eye(self._columns.shape[1])
 
@@ -114,6 +115,8 @@ class Space:
             beyond = free & (np.abs(estimate) > BOUND)
             if not beyond.any():
                 break
+            # A fixed tolerance is never freed again, unlike in an exact active-set method: the
+            # result may miss the minimum where tolerances are strongly correlated.
             estimate[beyond] = np.sign(estimate[beyond]) * BOUND
             free &= ~beyond
         return estimate
@@ -154,6 +157,8 @@ class Space:
         """
         estimate = self.estimate_tolerances(residual)
         free = np.abs(estimate) < BOUND
+        # Each response is judged alone, so only the diagonal of the Schur complement is needed: d'd
+        # - d'C N^-1 C'd.
         shared = self._columns[:, free].T @ responses
         absorbed = np.linalg.solve(self._normal[np.ix_(free, free)], shared)
         power = np.sum(responses**2, axis=0) - np.sum(shared * absorbed, axis=0)

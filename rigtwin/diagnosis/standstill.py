@@ -12,7 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigtwin.components import PUSHERS, ForceActuator, Guide
+from rigtwin.components import PUSHERS, ForceActuator, Guide, Pusher
+from rigtwin.components.plant import parameter_of
+from rigtwin.components.servo import pusher_of
 from rigtwin.description.machine import Machine, ReplayOf, Row
 from rigtwin.diagnosis.units import say
 from rigtwin.diagnosis.words import name_part
@@ -106,12 +108,12 @@ def _stands(
     pushers = [
         name
         for name in replay.moved_by
-        if components[name].joint == joint and isinstance(getattr(plant, name), PUSHERS)
+        if components[name].joint == joint and components[name].component_type in PUSHERS
     ]
     guides = [
         name
         for name, known in components.items()
-        if known.joint == joint and isinstance(getattr(plant, name), Guide)
+        if known.joint == joint and known.component_type is Guide
     ]
     if len(pushers) != 1 or not guides:
         return None
@@ -124,8 +126,9 @@ def _stands(
         if not _is_still(position):
             return None
         travels.append(float(np.ptp(position)))
-        pushes.append(_push(getattr(plant, pushers[0]), recording.column(*channel), position))
-    held = float(getattr(plant, guides[0]).coulomb)
+        pushes.append(_push(pusher_of(plant, pushers[0]), recording.column(*channel), position))
+    held = parameter_of(plant, guides[0], "coulomb")
+    # A push that the nominal friction holds is no observation: the twin would stand still as well.
     if max(pushes) <= PUSHED * held or max(pushes) == 0.0:
         return None
     return Standstill(row.name, guides[0], pushers[0], max(pushes), max(travels))
@@ -136,6 +139,8 @@ def _is_still(position: Array) -> bool:
     if np.ptp(position) == 0.0:
         return True
     parts = np.array_split(position, BLOCKS)
+    # Means average the noise out and leave a slow drift. The range of 50 normal deviates is 4.5
+    # standard deviations on average, and hardly ever more than `NOISES`.
     span = float(np.ptp([np.mean(part) for part in parts]))
     noise = white_noise(position) / np.sqrt(len(parts[-1]))
     values = np.unique(position)
@@ -144,11 +149,11 @@ def _is_still(position: Array) -> bool:
     return span <= max(NOISES * noise, STEPS * coarse)
 
 
-def _push(actuator: object, command: Array, position: Array) -> float:
+def _push(actuator: Pusher, command: Array, position: Array) -> float:
     """Return the largest change of force with which an actuator pushed, N."""
     if isinstance(actuator, ForceActuator):
         force = actuator.constant * actuator.gain * command
     else:
-        force = getattr(actuator, "position_gain", 0.0) * (command - position)
-    limit = getattr(actuator, "force_limit", np.inf)
+        force = actuator.position_gain * (command - position)
+    limit = actuator.force_limit
     return float(np.max(np.abs(np.clip(force, -limit, limit))))

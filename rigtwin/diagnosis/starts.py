@@ -64,6 +64,8 @@ def start_in_series(
     starts = []
     gates = [effect for effect in candidates if effect.kind.name == GATEWAY and effect.of is Guide]
     for gate in gates:
+        # Pairs of the three: friction with a spring, friction with a play, and a play with a
+        # spring.
         series = [gate] + [
             effect
             for effect in candidates
@@ -130,6 +132,7 @@ def _start_pair(
     both = (*effects, *pair)
     first, second = (fitter.starts(effect).values for effect in pair)
     starts = [(*values, *start) for start in product(first, second)]
+    # The combinations are only simulated. The best one is fitted by the search.
     return both, min(starts, key=lambda start: _misfit(fitter, both, start))
 
 
@@ -233,6 +236,8 @@ def start_elsewhere(
                 and is_possible(effects, fitter.plant)
                 and frozenset(effects) not in known
             ):
+                # Effects of one kind have the same parameters, so the values serve at the other
+                # component as well.
                 starts.append((effects, leader.values))
     return starts
 

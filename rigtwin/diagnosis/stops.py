@@ -9,11 +9,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rigtwin.components import PUSHERS, PositionActuator, measures
+from rigtwin.components import PUSHERS, PositionActuator, component_of
 from rigtwin.description.machine import Machine
 from rigtwin.description.mechanism import Mechanism
 from rigtwin.recording import Recording
 
+COMMANDED = (*PUSHERS, PositionActuator)
+"""Types of actuators whose commands have declared limits."""
 NEAR = 1e-3
 """Distance from an end of the range, as a share of it, within which a joint is at a stop."""
 
@@ -38,7 +40,8 @@ def find_stops(machine: Machine, recordings: Sequence[Recording]) -> list[str]:
     model = Mechanism(machine.model).model
     notes = []
     for name, component in machine.components.items():
-        if measures(getattr(machine.plant, name)) != "position" or len(component.acts_on) != 1:
+        # The sum or difference of several joints has no range of its own.
+        if component.quantity != "position" or len(component.acts_on) != 1:
             continue
         # A sensor may count against its joint. The coefficient is negative then, and sorting puts
         # the transformed ends in order.
@@ -49,6 +52,7 @@ def find_stops(machine: Machine, recordings: Sequence[Recording]) -> list[str]:
         low, high = np.sort(model.jnt_range[number] * coefficient)
         for recording in recordings:
             place = recording.column(*component.channel)
+            # A joint at its stop is measured with noise about it: hence a margin.
             at_stop = (place < low + NEAR * (high - low)) | (place > high - NEAR * (high - low))
             if at_stop.any():
                 first = int(np.argmax(at_stop))
@@ -78,11 +82,9 @@ def find_cut_commands(machine: Machine, recordings: Sequence[Recording]) -> list
     """
     notes = []
     for name, component in machine.components.items():
-        actuator = getattr(machine.plant, name)
-        if not isinstance(actuator, (*PUSHERS, PositionActuator)):
+        if component.channel is None or component.component_type not in COMMANDED:
             continue
-        if component.channel is None:
-            continue
+        actuator = component_of(machine.plant, name, *COMMANDED)
         low, high = actuator.command_low, actuator.command_high
         for recording in recordings:
             if not recording.has(*component.channel):

@@ -42,6 +42,8 @@ class Support:
     @property
     def confidence(self) -> float:
         """Calibrated probability that the effect is present and is no mimic."""
+        # The mimic is a separate reason to doubt, so its complement multiplies the weight before
+        # the calibration.
         probabilities, confidences = zip(*CALIBRATION, strict=True)
         likely = self.probability * (1.0 - self.mimic)
         return float(np.interp(likely, probabilities, confidences))

@@ -31,9 +31,10 @@ def swings(machine: Machine, recordings: Sequence[Recording]) -> dict[str, Swing
     """
     by_component: dict[str, Swing] = {}
     for component in machine.components.values():
-        followed = isinstance(getattr(machine.plant, component.name), Schedule)
+        followed = component.component_type is Schedule
         if component.channel is None or (component.channel[0] != "/command" and not followed):
             continue
+        # A recording of a set may lack a command that another one has.
         columns = [
             (r.column(*component.channel), r.period)
             for r in recordings
@@ -41,6 +42,7 @@ def swings(machine: Machine, recordings: Sequence[Recording]) -> dict[str, Swing
         ]
         if not columns:
             continue
+        # The quantiles are over all recordings together: a limit has to fit all of them.
         size = np.concatenate([np.abs(column) for column, _ in columns])
         rate = np.concatenate([np.abs(np.diff(column)) / period for column, period in columns])
         largest, fastest = (tuple(np.quantile(part, SHARES).tolist()) for part in (size, rate))

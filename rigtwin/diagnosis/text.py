@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from rigtwin.diagnosis.advice import advise
+from rigtwin.diagnosis.confounded_text import describe_confounded
 from rigtwin.diagnosis.finding import (
     Answer,
-    Confounded,
     Estimate,
     Finding,
     Gap,
@@ -26,8 +26,6 @@ UNBOUNDED = 1e9
 """Nominal values from this magnitude on mean that the twin has no such limit."""
 GAP_TO_CLOSE = 1.05
 """Gap, in noise floors, from which the closed share of it is worth a sentence."""
-EXACT = 0.1
-"""Difference of an exponent from ±1 below which a value counts as proportional."""
 INTERVAL_NOTE = (
     "intervals: 2.5 standard errors to either side; "
     "docs/confidence.md says how often they hold the true value"
@@ -37,6 +35,7 @@ INTERVAL_NOTE = (
 def format_distinct(first: float, second: float) -> tuple[str, str]:
     """Write two numbers to four digits, or to as many more as make the texts differ."""
     texts = "", ""
+    # A double has at most 17 significant digits, so 16 tell nearly any two apart.
     for digits in range(4, 17):
         texts = f"{first:.{digits}g}", f"{second:.{digits}g}"
         if texts[0] != texts[1]:
@@ -106,7 +105,7 @@ def _effect_lines(diagnosis: Answer) -> Iterator[str]:
         if effect.rivals:
             yield f"    these data cannot distinguish it from {_list_rivals(effect)}"
     for entry in diagnosis.confounded:
-        yield f"  {_describe_confounded(entry)}"
+        yield f"  {describe_confounded(entry)}"
     if (nearest := diagnosis.nearest) is not None:
         names = " + ".join(str(name) for name in nearest.names)
         yield (
@@ -189,32 +188,9 @@ def _list_rivals(effect: Finding) -> str:
 def _describe_rival(rival: Rival) -> str:
     if not rival.parameters:
         return str(rival.name)
-    others = [f"{name} with {_list_values(values)}" for name, values in rival.beside]
-    beside = f", beside {enumerate_words(others)}" if others else ""
+    changed = [f"{name} with {_list_values(values)}" for name, values in rival.beside]
+    beside = f", beside {enumerate_words(changed)}" if changed else ""
     return f"{rival.name} ({_list_values(rival.parameters)}{beside})"
-
-
-def _describe_confounded(entry: Confounded) -> str:
-    """Describe how the named values depend on a declared one, by the exponents' size."""
-    proportional = [str(name) for name, power in entry.exponents if abs(power - 1.0) < EXACT]
-    inverse = [str(name) for name, power in entry.exponents if abs(power + 1.0) < EXACT]
-    clauses = []
-    if proportional:
-        clauses.append(f"{enumerate_words(proportional)} {_is(proportional)} proportional to it")
-    if inverse:
-        clauses.append(f"{enumerate_words(inverse)} {_is(inverse)} inversely proportional to it")
-    for name, power in entry.exponents:
-        if abs(abs(power) - 1.0) >= EXACT:
-            clauses.append(f"{name} changes by {power:+.2g} % with each percent of it")
-    declared = write(entry.value, entry.unit)
-    return (
-        f"these values hold if {entry.assumed} is {declared}, which the data do not show: "
-        f"{enumerate_words(clauses)}"
-    )
-
-
-def _is(names: Sequence[str]) -> str:
-    return "is" if len(names) == 1 else "are"
 
 
 def sentence(verdict: Verdict, effects: Sequence[Finding], where: Sequence[Place], gap: Gap) -> str:
@@ -250,6 +226,7 @@ def sentence(verdict: Verdict, effects: Sequence[Finding], where: Sequence[Place
     if len(effects) > MOST_EFFECTS:
         shown = sorted(effects, key=lambda effect: -effect.share)[:MOST_EFFECTS]
         more = f"; and {len(effects) - MOST_EFFECTS} more effects that are smaller"
+    # One clause for each component, however many effects it has.
     parts: dict[str, list[str]] = {}
     for effect in shown:
         parts.setdefault(effect.name.component, []).append(_describe_effect(effect))

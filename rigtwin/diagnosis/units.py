@@ -37,6 +37,7 @@ def find_unit(unit: str, largest: float) -> tuple[float, str]:
         return 1e3, f"mm{rest}"
     if unit == "s" and 0.0 < largest < 0.1:
         return 1e3, "ms"
+    # The units of force and torque all begin with N.
     if base and (base[0] == "N" or base == "Pa") and largest >= SHORT_BELOW:
         return 1e-3, f"k{base}{rest}"
     return 1.0, "" if unit == "1" else unit

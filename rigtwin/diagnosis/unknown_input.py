@@ -115,6 +115,8 @@ class _Disturbance:
             normal, gradient = space.normal_equations(jacobian, residual)
             # Forms may be collinear in a recording that moves little.
             normal += np.diag(1e-6 * np.diag(normal) + 1e-9)
+            # The jacobian is that of the prediction, and the residual is measured minus predicted.
+            # Unlike in `gauss_newton` the step therefore needs no minus sign.
             step = np.linalg.solve(normal, gradient)
             gained = 0.0
             for share in STEP_SHARES:
@@ -125,6 +127,8 @@ class _Disturbance:
                     strengths = strengths + share * step
                     predicted, residual, misfit = trial, trial_residual, value
                     break
+            # The χ² that leaving out one form would cost if all others were refitted (Wald's
+            # statistic).
             worth = strengths**2 / np.diag(np.linalg.inv(normal))
             if gained < CONVERGED * misfit:
                 break
@@ -135,6 +139,8 @@ class _Disturbance:
         columns = []
         for number in range(len(strengths)):
             changed = strengths.copy()
+            # The forms are scaled to a disturbance that counts as small, so a unit step is a small
+            # one.
             changed[number] += 1.0
             response = [b - a for a, b in zip(predicted, self.predict(changed), strict=True)]
             columns.append(self._evidence.whiten(response))
@@ -205,9 +211,11 @@ def _use_tolerances(
 
 def _fit_component(disturbance: _Disturbance, space: Space, rounds: int) -> DisturbanceFit:
     without, misfit, worth = disturbance.fit(space, rounds)
+    # Forms of one name may enter twice, as sine and cosine, and count once.
     order = np.argsort(-worth)
     forms = tuple(
         dict.fromkeys(disturbance.names[form] for form in order[:3] if worth[form] > PRICE)
     )
+    # The price makes components with different numbers of forms comparable.
     priced = misfit + PRICE * len(disturbance.names)
     return DisturbanceFit(disturbance.component, priced, without - priced, forms)

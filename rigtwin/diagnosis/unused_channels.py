@@ -39,6 +39,7 @@ def describe_unused(evidence: Evidence, plant: Plant) -> Iterator[str]:
     """
     used = {*channels(evidence.machine)}
     used |= {c.channel for c in evidence.machine.components.values() if c.channel is not None}
+    # A channel that one recording lacks cannot be fitted over all of them.
     common = set.intersection(*({*recording.channels} for recording in evidence.recordings))
     common -= {".".join(channel) for channel in used}
     unused = sorted(channel for channel in common if channel.startswith(SENSORS))
@@ -71,18 +72,24 @@ def _explained_share(
     ):
         residual = lines.measured[row] - signals[row]
         speed = model.motion(name, plant).speed[: len(residual)]
+        # Interactions with direction and speed are what a friction that follows the channel has:
+        # its dry and its viscous part.
         level = recording[channel][:: model.every][: len(residual)]
         sign = np.sign(speed)
         residuals.append(residual)
         known.append(np.stack([np.ones_like(speed), speed, sign], axis=1))
         new.append(np.stack([level, level * speed, level * sign], axis=1))
-    target, others = np.concatenate(residuals), np.concatenate(known)
+    target, known_regressors = np.concatenate(residuals), np.concatenate(known)
     columns = np.concatenate(new)
+    # A constant channel is collinear with the known regressors, and nothing but rounding would
+    # remain of it.
     if np.ptp(columns[:, 0]) == 0.0:
         return 0.0
     # What direction, speed and a constant explain is no sign of the channel.
     stack = np.column_stack([target, columns])
-    free = stack - others @ np.linalg.lstsq(others, stack, rcond=None)[0]
+    # By the theorem of Frisch, Waugh and Lovell, regressing what remains of both sides gives the
+    # partial effect of the new regressors.
+    free = stack - known_regressors @ np.linalg.lstsq(known_regressors, stack, rcond=None)[0]
     residual, shapes = free[:, 0], free[:, 1:]
     fitted = shapes @ np.linalg.lstsq(shapes, residual, rcond=None)[0]
     return float(fitted @ fitted / max(float(residual @ residual), 1e-300))

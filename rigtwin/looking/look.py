@@ -15,11 +15,12 @@ from rigtwin.description.machine import Machine
 from rigtwin.diagnosis import calibrated
 from rigtwin.diagnosis.data_checks import require_fit
 from rigtwin.diagnosis.diagnose import diagnose
+from rigtwin.diagnosis.effect_fit import EffectFit
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.first_look import FirstLook, look_first
 from rigtwin.diagnosis.fit import clashes, with_values
 from rigtwin.diagnosis.fitter import Fitter
-from rigtwin.diagnosis.known_effects import EffectFit, find_effects, fit_effects
+from rigtwin.diagnosis.known_effects import find_effects, fit_effects
 from rigtwin.diagnosis.prices import Prices
 from rigtwin.diagnosis.result import Diagnosis
 from rigtwin.diagnosis.thresholds import STANDARD

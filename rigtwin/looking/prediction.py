@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigtwin.diagnosis.evidence import Lines
+from rigtwin.diagnosis.lines import Lines
 from rigtwin.diagnosis.overlay import COUNTS
 from rigtwin.numerics.arrays import Array
 

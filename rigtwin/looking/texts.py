@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from html import escape
 
-from rigtwin.diagnosis.known_effects import EffectFit
+from rigtwin.diagnosis.effect_fit import EffectFit
 from rigtwin.looking.look import Look
 from rigtwin.looking.prediction import Prediction
 from rigtwin.looking.starting_point import StartingPoint

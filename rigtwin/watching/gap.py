@@ -9,7 +9,8 @@ import numpy as np
 from numpy.fft import irfft
 from numpy.typing import NDArray
 
-from rigtwin.diagnosis.evidence import Evidence, Lines
+from rigtwin.diagnosis.evidence import Evidence
+from rigtwin.diagnosis.lines import Lines
 from rigtwin.diagnosis.space import Space
 from rigtwin.numerics.arrays import Array
 

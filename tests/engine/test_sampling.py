@@ -83,7 +83,12 @@ def outstanding(
         for name in names
         if f"{kind}@{name}" not in hidden
     ]
-    machine: Any = SimpleNamespace(rows=rows, effects=lambda: effects)
+    components = {name: SimpleNamespace(quantity="position") for name in names}
+    components |= {
+        "drive": SimpleNamespace(quantity=""),
+        "quiet": SimpleNamespace(quantity="force"),
+    }
+    machine: Any = SimpleNamespace(rows=rows, effects=lambda: effects, components=components)
     sensors = {name: Lvdt(**nominal) for name in names}
     plant: Any = SimpleNamespace(**sensors, drive=Motor(), quiet=LoadCell(white=0.0), mains=Mains())
     predicted = [np.tile(MOTION, (len(rows), 1))] * recordings

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rigtwin.components.sensors import start_transducer, transduce, transducer
+from rigtwin.components.sensors import sensor_of, start_transducer, transduce, transducer
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Machine, Row
 from rigtwin.hardware.daq.conversion import conversion, to_bits, to_values, to_volts
@@ -42,7 +42,8 @@ class MachineTerminals:
         self._names, self._plant, self._period = [row.name for row in rows], plant, period
         outputs = [line.name for line in wiring.outputs]
         self._stepped = begin_live(machine, configuration, outputs, rows)
-        self._models = [transducer(getattr(plant, name), period) for name in self._names]
+        self._sensors = [sensor_of(plant, name) for name in self._names]
+        self._models = [transducer(sensor, period) for sensor in self._sensors]
         self._states = [start_transducer(model) for model in self._models]
         self._inputs, self._outputs = conversion(wiring.inputs), conversion(wiring.outputs)
         # An independent random stream for the sensors: the seed also draws other quantities, which
@@ -71,9 +72,11 @@ class MachineTerminals:
         if self._place == AHEAD:
             time = self._period * (self._drawn + np.arange(AHEAD))
             self._noise = [
-                getattr(self._plant, name).white * self._random.standard_normal(AHEAD)
+                sensor.white * self._random.standard_normal(AHEAD)
                 + hum_of(self._plant, name, phase, time)
-                for name, phase in zip(self._names, self._phases.tolist(), strict=True)
+                for name, sensor, phase in zip(
+                    self._names, self._sensors, self._phases.tolist(), strict=True
+                )
             ]
             self._place, self._drawn = 0, self._drawn + AHEAD
         true = self._stepped.sense()
@@ -81,7 +84,7 @@ class MachineTerminals:
             value = transduce(self._models[number], self._states[number], true[name])
             self._values[number] = value + self._noise[number][self._place]
             # A sensor with its own resolution quantises before the card's converter does.
-            if getattr(self._plant, name).resolution > 0.0:
+            if self._sensors[number].resolution > 0.0:
                 reading = round_reading(self._plant, name, self._values[number : number + 1])
                 self._values[number] = reading[0]
         self._place += 1

@@ -152,7 +152,7 @@ def signals_of(machine: Machine) -> Signals:
         outputs=tuple(signal(name, channel) for name, channel in pushers.items()),
         power="enable",
         # A force without a controller is safe at zero; a servo is safe where it stands.
-        released=tuple(isinstance(getattr(machine.plant, n), ForceActuator) for n in pushers),
+        released=tuple(components[n].component_type is ForceActuator for n in pushers),
         written=tuple(range(len(pushers))),
     )
 

@@ -38,6 +38,7 @@ from controllers.linear_law import LinearLaw
 from rigtwin.components import RigPlant
 from rigtwin.components.cylinder import closed_loop as loop_of
 from rigtwin.components.gas_spring import stiffness
+from rigtwin.components.sensors import Sensor
 from rigtwin.components.tyre import tyre_force
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.control import set_up
@@ -227,12 +228,12 @@ def mechanics(plant: RigPlant, preload: float) -> tuple[Array, Array, Array]:
     return a, b, c
 
 
-def _transducer(sensor: object, period: float) -> tuple[Array, Array, Array, float]:
+def _transducer(sensor: Sensor, period: float) -> tuple[Array, Array, Array, float]:
     """Return A (n, n), B (n, 1), C (1, n) and D of a sensor from its quantity to its sample.
 
     The delay acts first, then the lag, then the gain.
     """
-    delay, lag, gain = (float(getattr(sensor, name)) for name in ("delay", "lag", "gain"))
+    delay, lag, gain = float(sensor.delay), float(sensor.lag), float(sensor.gain)
     whole = math.floor(delay / period + 1e-9)
     part = max(delay / period - whole, 0.0)
     # A lag's discrete filter: y[k] = y[k-1] + share (x[k] - y[k-1]).
