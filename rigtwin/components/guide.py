@@ -94,9 +94,9 @@ class Guide(NamedTuple):
     T_n is the Chebyshev polynomial of degree n, and ξ = (x − curve_middle)/curve_half_range, held
     within ±1: beyond the range in which a curve was identified, its force stays as at the end.
 
-    The transmitted force F_t is the force of the drive, as in a gear whose loss is in proportion to
-    its torque. Where the motion is given, `driven_limits` finds it (docs/theory.md, "Load
-    friction").
+    The transmitted force is what reaches the guide from the body and the guide's own spring where
+    the motion is given, and the actuator's force where the motion follows from a force
+    (docs/theory.md, "Load friction").
     """
 
     # Coulomb friction, viscous friction and spring: the MJCF has values for these.
@@ -109,7 +109,7 @@ class Guide(NamedTuple):
     ] = 0.01
     stribeck_exponent: Annotated[float, STRIBECK_EXPONENT] = 2.0
     asymmetry: Annotated[float, Quantity("N", -1e7, 1e7, NONE)] = 0.0
-    load_coefficient: Annotated[float, Quantity("1", 0.0, 0.95, NONE)] = 0.0
+    load_coefficient: Annotated[float, Quantity("1", 0.0, 2.0, NONE)] = 0.0
     backlash: Annotated[float, Quantity("m", 0.0, 10.0, NONE)] = 0.0
     compliance: Annotated[float, Quantity("m/N", 0.0, 1.0, NONE)] = 0.0
     mount_compliance: Annotated[float, Quantity("m/N", 0.0, 1.0, NONE)] = 0.0
@@ -199,45 +199,6 @@ def dry_limits(dry: Friction, velocity: float, load: float) -> tuple[float, floa
         power = ratio * ratio if exponent == 2.0 else ratio**exponent
         size += dry.stribeck * math.exp(-power)
     return max(size + 0.5 * dry.asymmetry, 0.0), max(size - 0.5 * dry.asymmetry, 0.0)
-
-
-@compilable
-def driven_limits(dry: Friction, velocity: float, required: float) -> tuple[float, float]:
-    """Return the limits of dry friction where the force F that drives a motion is sought.
-
-    Load friction is in proportion to the drive's own force, which contains it:
-
-        F = required + limit,   limit = c + load_coefficient·|F|    against positive motion,
-
-    with the limit c without load. That gives |F| = |required + c| / (1 − μ·sgn(required + c)), and
-    the mirror image against negative motion.
-
-    Parameters
-    ----------
-    dry
-        Parameters of the friction.
-    velocity
-        Velocity of the motion, m/s.
-    required
-        Force of the drive without dry friction, N.
-
-    Returns
-    -------
-    tuple
-        Largest forces against positive and against negative motion, N.
-    """
-    forward, backward = dry_limits(dry, velocity, 0.0)
-    if dry.load_coefficient == 0.0:
-        return forward, backward
-    ahead, back = required + forward, required - backward
-    # A drive that lifts its load works against the friction that its own force causes; a load that
-    # drives the motion is held by it.
-    lifting = 1.0 - math.copysign(dry.load_coefficient, ahead)
-    lowering = 1.0 + math.copysign(dry.load_coefficient, back)
-    return (
-        forward + dry.load_coefficient * abs(ahead) / lifting,
-        backward + dry.load_coefficient * abs(back) / lowering,
-    )
 
 
 @compilable

@@ -6,7 +6,7 @@ Nothing is integrated but the friction elements, whose state follows from the mo
 
 from __future__ import annotations
 
-from rigtwin.components.guide import damping, driven_limits, position_force, slide
+from rigtwin.components.guide import damping, dry_limits, position_force, slide
 from rigtwin.components.guide_step import GuideStep
 from rigtwin.components.mount import MountState, give_way
 from rigtwin.models.joint_motion import Inertia, gravity
@@ -25,7 +25,7 @@ def resist(guide_step: GuideStep, motion: Array, out: Array) -> None:
     motion
         Position, velocity and acceleration, m, m/s and m/s², shape (3, ticks).
     out
-        Load of the guide, N, shape (ticks,); overwritten with the force that drives it.
+        Transmitted load, N, shape (ticks,); overwritten with the whole force.
     """
     guide = guide_step.guide
     # At the start the friction spring is slack, as after a long rest.
@@ -38,14 +38,14 @@ def resist(guide_step: GuideStep, motion: Array, out: Array) -> None:
         return
     for tick in range(motion.shape[1]):
         x, v = motion[0, tick], motion[1, tick]
-        viscous += guide_step.share * (damping(guide, v) * v - viscous)
-        required = out[tick] + position_force(guide, x, guide_step.rest)
-        required += viscous + guide.drag * v * abs(v)
-        forward, backward = driven_limits(guide_step.dry_friction, v, required)
+        # Load-dependent friction sees inertia, gravity and spring, but not friction itself.
+        transmitted = out[tick] + position_force(guide, x, guide_step.rest)
+        forward, backward = dry_limits(guide_step.dry_friction, v, transmitted)
         half = 0.5 * guide.backlash
         dry, by = slide(x - slider, half, guide_step.spring, forward, backward)
         slider += by
-        out[tick] = required + dry
+        viscous += guide_step.share * (damping(guide, v) * v - viscous)
+        out[tick] = transmitted + dry + viscous + guide.drag * v * abs(v)
 
 
 @kernel
@@ -58,12 +58,11 @@ def resist_at_once(guide_step: GuideStep, motion: Array, out: Array) -> None:
     guide, viscous = guide_step.guide, 0.0
     for tick in range(motion.shape[1]):
         x, v = motion[0, tick], motion[1, tick]
-        viscous += guide_step.share * (damping(guide, v) * v - viscous)
-        required = out[tick] + position_force(guide, x, guide_step.rest)
-        required += viscous + guide.drag * v * abs(v)
-        forward, backward = driven_limits(guide_step.dry_friction, v, required)
+        transmitted = out[tick] + position_force(guide, x, guide_step.rest)
+        forward, backward = dry_limits(guide_step.dry_friction, v, transmitted)
         dry = forward if v > 0.0 else (-backward if v < 0.0 else 0.0)
-        out[tick] = required + dry
+        viscous += guide_step.share * (damping(guide, v) * v - viscous)
+        out[tick] = transmitted + dry + viscous + guide.drag * v * abs(v)
 
 
 @kernel

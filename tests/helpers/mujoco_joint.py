@@ -14,14 +14,7 @@ import numpy as np
 
 from rigtwin.components import Guide
 from rigtwin.components.conditioning import actuator, condition, hold
-from rigtwin.components.guide import (
-    damping,
-    driven_limits,
-    dry_limits,
-    friction,
-    position_force,
-    slide,
-)
+from rigtwin.components.guide import damping, dry_limits, friction, position_force, slide
 from rigtwin.components.guide_step import guide_step_of
 from rigtwin.components.mount import MountState, give_way
 from rigtwin.components.plant import Plant
@@ -113,12 +106,12 @@ class MujocoModel(JointSimulation):
                 behind, held_back = give_way(guide_step, behind, load, x)
                 out[2, tick] = load + held_back
                 continue
-            viscous += share * (damping(guide, v) * v - viscous)
-            load += position_force(guide, x, rest) + viscous + guide.drag * v * abs(v)
-            forward, backward = driven_limits(dry, v, load)
+            load += position_force(guide, x, rest)
+            forward, backward = dry_limits(dry, v, load)
             rubbed, by = slide(x - slider, 0.5 * guide.backlash, 1.0 / softest, forward, backward)
             slider += by
-            out[2, tick] = load + rubbed
+            viscous += share * (damping(guide, v) * v - viscous)
+            out[2, tick] = load + rubbed + viscous + guide.drag * v * abs(v)
         return out
 
     def integrate_pushed(
