@@ -93,15 +93,8 @@ def test_friction_that_changed_is_named_with_its_values(
 
 
 @pytest.mark.slow
-def test_friction_that_doubled_is_still_friction(machine: rigtwin.Machine):
-    (changed,) = rigtwin.what_changed(recorded(machine, (6.0, 12.0))).changed
-    assert str(changed.name) == "coulomb@guide"
-    assert [each.value for each in changed.values] == pytest.approx([6.0, 12.0], rel=0.02)
-
-
-@pytest.mark.slow
 def test_friction_that_falls_with_time_is_named_as_that(machine: rigtwin.Machine):
-    found = rigtwin.what_changed(recorded(machine, (8.0, 7.4, 6.8, 6.3, 5.7)))
+    found = rigtwin.what_changed(recorded(machine, (8.0, 7.4, 6.8, 6.3)))
     (changed,) = found.changed
     assert str(changed.name) == "coulomb@guide"
     assert changed.named
