@@ -53,7 +53,7 @@ def test_nothing_changed(machine: rigtwin.Machine):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("seed", range(3))
 def test_nothing_changed_whatever_the_noise(machine: rigtwin.Machine, seed: int):
     assert rigtwin.what_changed(recorded(machine, (6.0, 6.0), 10 + 2 * seed)).changed == ()
 
@@ -90,16 +90,6 @@ def test_friction_that_changed_is_named_with_its_values(
     assert values == pytest.approx([6.0, 6.6], rel=0.01)
     # Two recordings differ in more than one way.
     assert not changed[0]["named"]
-
-
-@pytest.mark.slow
-def test_friction_that_falls_with_time_is_named_as_that(machine: rigtwin.Machine):
-    found = rigtwin.what_changed(recorded(machine, (8.0, 7.4, 6.8, 6.3)))
-    (changed,) = found.changed
-    assert str(changed.name) == "coulomb@guide"
-    assert changed.named
-    assert changed.trends[0].name.startswith("time")
-    assert changed.trends[0].slope == pytest.approx(-0.57, abs=0.05)
 
 
 def test_one_recording_cannot_change(machine: rigtwin.Machine):

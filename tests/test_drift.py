@@ -55,10 +55,7 @@ def test_without_drift_none_is_named():
 
 @pytest.mark.parametrize(
     ("sensor", "drift"),
-    [
-        ("structure_lvdt", 1e-4),
-        ("load_cell", 1.0),
-    ],
+    [("load_cell", 1.0)],
 )
 @pytest.mark.slow
 def test_a_drift_on_the_suspension_rig_is_no_offset(sensor: str, drift: float):
