@@ -27,12 +27,3 @@ def test_the_card_commands_byte_for_byte_what_the_twin_does(name: str, tmp_path:
     ours, theirs = (rigtwin.load(path)["/command.structure"] for path in (twin, ended.path))
     length = min(len(ours), len(theirs))
     assert not np.array_equal(ours[:length], theirs[:length])
-
-
-@pytest.mark.slow
-def test_faults_are_stopped_with_a_compensator_as_without() -> None:
-    settings = {"controller": {"plate_compensator": "kalman-inverse"}}
-    campaign = rigtwin.faults(seed=3, per_kind=1, per_process_kind=0, settings=settings)
-    assert not campaign.undone
-    assert len(campaign.results) == campaign.drawn
-    assert not campaign.failed
