@@ -211,7 +211,8 @@ class FileContent:
         last = [
             times[-1]
             for number, (times, _) in self._raw.items()
-            if times and self._channels[number].topic in list_topics()
+            # Damage may have taken the record that names a channel.
+            if times and number in self._channels and self._channels[number].topic in list_topics()
         ]
         return 1e-9 * min(last, default=0)
 
@@ -243,7 +244,9 @@ class FileContent:
             self._channels[record.id] = record
 
     def forget(self, before: float) -> None:
-        """Drop all messages before a time in s."""
+        """Drop all messages before a time in s; none for minus infinity."""
+        if before == -math.inf:
+            return
         for times, data in self._raw.values():
             # Messages are in order of time, so a prefix is dropped.
             first = bisect_left(times, round(before * 1e9))
