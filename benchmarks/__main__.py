@@ -111,7 +111,7 @@ def _loaded_loop() -> None:
 def _help() -> None:
     """Run `rigtwin --help` in a new process."""
     subprocess.run(
-        [sys.executable, "-m", "rigtwin.cli", "--help"], check=True, stdout=subprocess.DEVNULL
+        [sys.executable, "-m", "rigtwin", "--help"], check=True, stdout=subprocess.DEVNULL
     )
 
 

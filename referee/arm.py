@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +11,14 @@ import numpy as np
 from referee.arm_cases import MACHINES, ArmCase, draw_arm, record_arm
 from referee.score import ScoreRow, names, share_of
 from referee.wild_cases import WildData
-from referee.withheld import Question, Withheld, check_machines, score_lines, seconds_row
+from referee.withheld import (
+    Question,
+    Withheld,
+    check_machines,
+    score_document,
+    score_lines,
+    seconds_row,
+)
 from rigtwin.studies.sweep import Workers
 
 FLAGGED = ("unknown", "partly explained")
@@ -117,22 +123,12 @@ def _list_misses(result: ArmResult) -> Iterator[str]:
 
 def arm_document(result: ArmResult) -> dict[str, Any]:
     """Return the score as a JSON document, with the defects and the answer of every machine."""
-    return {
-        "seed": result.seed,
-        "cases": len(result.cases),
-        "rows": [asdict(row) for row in arm_rows(result)],
-        "machines": [
-            {
-                "machine": case.machine,
-                "sort": case.sort,
-                "defects": [list(defect) for defect in case.defects],
-                "named": names(answer),
-                "verdict": answer["verdict"],
-                "effects": answer["effects"],
-            }
-            for case, answer in zip(result.cases, result.answers, strict=True)
-        ],
-    }
+    return score_document(result, arm_rows(result), _describe)
+
+
+def _describe(case: ArmCase) -> dict[str, Any]:
+    defects = [list(defect) for defect in case.defects]
+    return {"machine": case.machine, "sort": case.sort, "defects": defects}
 
 
 def arm_table(result: ArmResult) -> str:

@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from referee.score import ScoreRow, names, share_of
 from referee.servo_cases import DESCRIPTION, NOMINAL, ServoCase, draw_servo, record_servo
 from referee.wild_cases import WildData
-from referee.withheld import Question, Withheld, check_machines, score_lines, seconds_row
+from referee.withheld import (
+    Question,
+    Withheld,
+    check_machines,
+    score_document,
+    score_lines,
+    seconds_row,
+)
 from rigtwin.studies.sweep import Workers
 
 ServoResult = Withheld[ServoCase]
@@ -102,20 +108,7 @@ def _list_misses(result: ServoResult) -> Iterator[str]:
 
 def servo_document(result: ServoResult) -> dict[str, Any]:
     """Return the score as a JSON document, with the defects and the answer of every machine."""
-    return {
-        "seed": result.seed,
-        "cases": len(result.cases),
-        "rows": [asdict(row) for row in servo_rows(result)],
-        "machines": [
-            {
-                "defects": list(case.defects),
-                "named": names(answer),
-                "verdict": answer["verdict"],
-                "effects": answer["effects"],
-            }
-            for case, answer in zip(result.cases, result.answers, strict=True)
-        ],
-    }
+    return score_document(result, servo_rows(result), lambda case: {"defects": list(case.defects)})
 
 
 def servo_table(result: ServoResult) -> str:

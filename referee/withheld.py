@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 import numpy as np
 
-from referee.score import ScoreRow
+from referee.score import ScoreRow, names
 from referee.wild_cases import WildData
 from rigtwin.errors import RigtwinError
 from rigtwin.studies.sweep import Store, Workers, run_jobs
@@ -105,6 +105,36 @@ def answer_question(question: Question) -> dict[str, Any]:
     except RigtwinError as error:
         seconds = time.perf_counter() - start
         return {"verdict": "unusable", "effects": [], "sentence": str(error), "seconds": seconds}
+
+
+def score_document(
+    result: Withheld[Case], rows: Sequence[ScoreRow], describe: Callable[[Case], dict[str, Any]]
+) -> dict[str, Any]:
+    """Return a score as a JSON document, with the answer to every case.
+
+    Parameters
+    ----------
+    result : Withheld
+        Cases and answers.
+    rows : sequence of ScoreRow
+        Measures of the score.
+    describe : callable
+        Function that returns what the document says of a case.
+    """
+    return {
+        "seed": result.seed,
+        "cases": len(result.cases),
+        "rows": [asdict(row) for row in rows],
+        "machines": [
+            {
+                **describe(case),
+                "named": names(answer),
+                "verdict": answer["verdict"],
+                "effects": answer["effects"],
+            }
+            for case, answer in zip(result.cases, result.answers, strict=True)
+        ],
+    }
 
 
 def seconds_row(answers: Sequence[dict[str, Any]]) -> ScoreRow:

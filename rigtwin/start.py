@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import _signal  # pyright: ignore[reportMissingImports]
-import sys
 
 # Python's own handler would print the import that was under way; `signal` itself imports more.
 if _signal.getsignal(_signal.SIGINT) is _signal.default_int_handler:
@@ -15,7 +14,3 @@ def main() -> int:
     from rigtwin import cli
 
     return cli.main()
-
-
-if __name__ == "__main__":
-    sys.exit(main())

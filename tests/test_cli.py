@@ -167,7 +167,7 @@ def test_ctrl_c_leaves_a_readable_recording_and_one_line(tmp_path):
     command = [
         sys.executable,
         "-m",
-        "rigtwin.cli",
+        "rigtwin",
         "run",
         "drop",
         "--out",
@@ -195,7 +195,7 @@ def test_progress_is_shown_on_a_terminal_only(tmp_path, capsys):
     run = ["run", "drop", "--out", str(tmp_path / "p.mcap"), *QUICK]
     assert main(run) == 0
     assert capsys.readouterr().err == ""
-    command = [sys.executable, "-m", "rigtwin.cli", *run]
+    command = [sys.executable, "-m", "rigtwin", *run]
     controller, terminal = pty.openpty()
     fcntl.ioctl(terminal, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 80, 0, 0))
     subprocess.run(command, stderr=terminal, stdout=subprocess.DEVNULL, check=True)

@@ -96,7 +96,7 @@ def test_an_interruption_comes_behind_what_it_would_spoil() -> None:
     "start",
     [
         ["-c", "import rigtwin.start; KILL"],
-        ["-c", "import sys; sys.argv = ['-m']; import rigtwin.cli; KILL"],
+        ["-c", "import rigtwin.__main__; KILL"],
     ],
 )
 def test_an_interruption_while_packages_are_imported_prints_nothing(start: list[str]) -> None:

@@ -100,7 +100,7 @@ def test_what_is_no_recording_ends_the_page(tmp_path):
 
 
 def test_the_command_prints_the_alarm_and_ends_with_ctrl_c(changed):
-    command = [sys.executable, "-m", "rigtwin.cli", "look", str(changed), "--live", "--port", "0"]
+    command = [sys.executable, "-m", "rigtwin", "look", str(changed), "--live", "--port", "0"]
     running = subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=changed.parent
     )

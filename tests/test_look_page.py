@@ -228,7 +228,7 @@ def test_a_page_cannot_be_shared_with_the_world():
 def test_the_command_ends_with_ctrl_c(look, tmp_path):
     recording = tmp_path / "shaken.mcap"
     rigtwin.run(look.machine, "shake", seed=1, effects={EFFECT: TRUE}, path=recording)
-    command = [sys.executable, "-m", "rigtwin.cli", "look", str(recording), "--port", "0"]
+    command = [sys.executable, "-m", "rigtwin", "look", str(recording), "--port", "0"]
     running = subprocess.Popen(
         [*command, "--machine", str(look.machine.path)],
         stdout=subprocess.PIPE,

@@ -263,7 +263,7 @@ def test_kill_9_while_the_twin_runs(tmp_path):
     command = [
         sys.executable,
         "-m",
-        "rigtwin.cli",
+        "rigtwin",
         "run",
         "road10",
         "--out",

@@ -242,15 +242,20 @@ def tune_compensator(
     ----------
     name : str
         Compensator, one of `TUNABLE`.
-    case, quake : int, str
-        Case of the building, 1 to 4, and earthquake: elcentro, kobe or morgan.
-    plants, held_out_plants : int
-        Numbers of plants in the criterion, the nominal one included, and in the validation, 1 to
-        1000.
+    case : int
+        Case of the building, 1 to 4. Defaults to 4.
+    quake : str
+        Earthquake: elcentro, kobe or morgan. Defaults to elcentro.
+    plants : int
+        Number of plants in the criterion, the nominal one included, 1 to 1000. Defaults to 8.
+    held_out_plants : int
+        Number of plants for the validation, 1 to 1000. Defaults to 12.
     evaluations : int
         Largest number of evaluations of the criterion, 3 to 1000. Defaults to 60.
-    seed, progress : int, callable
-        Seed of the random plants, and function called with 1 after every evaluation.
+    seed : int
+        Seed of the random plants. Defaults to 1.
+    progress : callable
+        Function called with 1 after every evaluation.
 
     Returns
     -------

@@ -112,16 +112,19 @@ def dry_run(
 
     Parameters
     ----------
-    experiment, machine, card, settings, seed, controller, effects
-        Test to rehearse, see `plan_test`. With effects, or with the shipped channel table, nothing
-        is noted.
+    experiment, machine, card, settings, seed, controller
+        Test to rehearse, see `plan_test`. With the shipped channel table nothing is noted.
+    effects
+        Effects added to the twin. With any effect nothing is noted.
     path
         File of the recording, MCAP.
     progress
         Function called with the number of ticks since its last call.
-    stop, stop_file
+    stop
         Function that returns a reason to end the session, or None. By default the session ends at
-        a key, at a signal such as Ctrl-C's, or when the file appears.
+        a key, or at a signal such as Ctrl-C's.
+    stop_file
+        File whose appearance ends the session, unless `stop` is given.
 
     Returns
     -------
@@ -248,13 +251,19 @@ def run_on_card(
         Test to run, see `plan_test`.
     card
         Channel table of the card, calibrated and signed by an operator.
-    path, live, progress, stop, stop_file
-        Recording, live view, report of progress, and reasons to end the test, see `run_on_twin`.
+    path
+        File of the recording, MCAP.
     arm
         Function that asks the operator whether everybody is clear of the machine. It is called
         before anything moves, and nothing moves unless it returns True.
     without_dry_run
         Name of the person responsible for a test without a passed dry run. It is recorded.
+    live
+        Port of a live view for Foxglove; 0, the default, opens none.
+    progress
+        Function called with the number of ticks since its last call.
+    stop, stop_file
+        Reasons to end the test, see `dry_run`.
 
     Returns
     -------

@@ -45,15 +45,24 @@ def watch(
     ----------
     path
         File of the recording, MCAP, which another program is writing or will write.
-    machine, settings, without
-        Machine of the recording, changes of the twin, and effects removed from it, see `diagnose`.
-    on_update, suspects
-        Function called with the `Watch` after each judged interval and each search for suspects,
-        and whether to search for effects that may cause an alarm.
-    step, patience
-        Length of the interval that is judged at a time, 0.5 s by default, and time without new
-        data after which the recording is given up, 30 s by default. The interval grows where the
+    machine
+        Machine the recording belongs to, or its name, or the path of its description. Defaults to
+        the one named in the recording.
+    settings
+        Changes of the twin before the comparison: of its plant and `timing.timestep`. All other
+        settings are the recording's own.
+    without
+        Effects of the nominal machine that are removed from the twin first, such as
+        "coulomb@rail".
+    on_update
+        Function called with the `Watch` after each judged interval and each search for suspects.
+    suspects
+        Whether to search for effects that may cause an alarm. Defaults to True.
+    step
+        Length of the interval that is judged at a time, in s, 0.5 by default. It grows where the
         comparison takes longer than the test.
+    patience
+        Time without new data after which the recording is given up, in s, 30 by default.
     stop
         Function called between two looks at the file; the watch ends when it returns True.
 

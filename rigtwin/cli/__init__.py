@@ -3,18 +3,13 @@ help is instant."""
 
 from __future__ import annotations
 
-import sys
-
-if sys.argv[:1] == ["-m"]:
-    # The interpreter looks for the module that it is to run: this one.
-    import rigtwin.start  # noqa: F401
-
 import argparse
 import atexit
 import gc
 import io
 import os
 import signal
+import sys
 import warnings
 from collections.abc import Sequence
 from contextlib import suppress
@@ -149,7 +144,3 @@ def _say(error: object) -> None:
     """A fault in one line, which names no more of what is wrong than anybody reads."""
     said = printable(" ".join(str(error).split()))
     print(f"rigtwin: {said[:LONGEST]}{'…' if len(said) > LONGEST else ''}", file=sys.stderr)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -5,9 +5,9 @@ With the channel's value u behind a first-order lag, position x and velocity v o
     F = coulomb·u·s + viscous·u·v + offset·u,
 
 where s, from −1 to 1, is dry friction of unit size: the direction of motion, after a reversal only
-once the joint has moved by the error of its measured position. Where the friction builds up over a
-speed v_r, `rounding`, s = tanh(v/v_r). The dampers of controllable fluids
-are of this kind [Spencer, Dyke, Sain and Carlson, J. Eng. Mech. 123(3), 1997].
+once the joint has moved by the error of its measured position. Friction that builds up over a speed
+v_r, the `rounding`, has s = tanh(v/v_r). The dampers of controllable fluids are of this kind
+[Spencer, Dyke, Sain and Carlson, J. Eng. Mech. 123(3), 1997].
 """
 
 from __future__ import annotations

@@ -273,10 +273,10 @@ def _apply_to_actuator(
         if "dampratio" in tag.attributes:
             return False
         servo = component_of(machine.plant, component.name, Servo)
-        own = {other.parameter for other in changes if other.component == component.name}
+        changed = {other.parameter for other in changes if other.component == component.name}
         for parameter, attribute in ATTRIBUTES[Servo].items():
             # A gain that is changed by itself is scaled where it is written.
-            if parameter not in own:
+            if parameter not in changed:
                 value = change.value / servo.gains * float(getattr(servo, parameter))
                 document.set(tag, attribute, _number(value))
     elif change.parameter == "lag" and of is Servo and tag.name == "position":

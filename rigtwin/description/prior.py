@@ -29,8 +29,8 @@ class ModelPrior:
         Deviation of the library's laws from the forms that they have in the machine, as a share of
         the amplitude that they explain. A rare effect that explains less may only correct a form.
     scale
-        Standard error, as a share of it, that no change of a parameter falls below: the declared
-        masses and gains, from which all forces and motions take their scale, are not exact.
+        Smallest standard error of a change, as a share of the change. Declared masses and gains,
+        from which all forces and motions take their scale, are not exact.
     implausible_scale
         Ratio of a measured signal to its prediction, or its inverse, from which the unit of the
         recording is wrong rather than the gain of the machine.

@@ -207,8 +207,8 @@ def _standard_errors(
         b^2 = (c^2 / d^2 + s^2) (value - nominal)^2,
 
     with the standard errors of cross-validation and of the final fit, the spread of the value over
-    all hypotheses, and the bias b that the unexplained residual and the scale of the declared
-    parameters may cause. The latter is known to s (`ModelPrior.scale`). A residual whose
+    comparable hypotheses, and a bias b of two causes: the declared parameters have a scale that is known
+    to the share s only (`ModelPrior.scale`), and a residual is unexplained. A residual whose
     amplitude is 1/d of the effect's response shifts the magnitude by 1/d times the correlation of
     both, of which only the usual size c (`Thresholds.rest_correlation`) is known. The bias widens
     the interval but does not lower the confidence: `Support.mimic` covers an effect that merely

@@ -82,7 +82,7 @@ def require_plausible(period: float, said: bool) -> None:
     Raises
     ------
     RigtwinError
-        If it is implausible; the message names the units in which it would be plausible.
+        If the period is implausible; the message names the units in which it would be plausible.
     """
     low, high = POSSIBLE if said else PLAUSIBLE
     if low <= period <= high:

@@ -57,7 +57,7 @@ class Shape:
     position, turn
         Pose in the body's frame: position in m, and a quaternion.
     is_plane
-        Whether it is the plane of a floor or wall.
+        Whether the geom is the plane of a floor or wall.
     """
 
     body: int

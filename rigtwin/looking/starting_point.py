@@ -127,7 +127,7 @@ def from_document(document: Mapping[str, Any], look: Look, path: str) -> Startin
     Raises
     ------
     RigtwinError
-        If it is no diagnosis, or belongs to other recordings or to another machine.
+        If the document is no diagnosis, or belongs to other recordings or to another machine.
     """
     try:
         machine, recordings = str(document["machine"]), [str(r) for r in document["recordings"]]
