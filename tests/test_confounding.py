@@ -72,3 +72,10 @@ def test_a_dependence_is_told_in_words(power: float, words: str) -> None:
     entry = Confounded(Name("bob", "mass"), 3.45, "kg", ((Name("pivot", "coulomb"), power),))
     text = describe_confounded(entry)
     assert text == f"these values hold if mass@bob is 3.45 kg, which the data do not show: {words}"
+
+
+def test_the_report_says_what_the_values_depend_on(
+    stiffer: rigtwin.Diagnosis, tmp_path: Path
+) -> None:
+    stiffer.report(tmp_path / "why.html")
+    assert "These values hold if mass@arm is" in (tmp_path / "why.html").read_text()

@@ -207,11 +207,11 @@ def _standard_errors(
         b^2 = (c^2 / d^2 + s^2) (value - nominal)^2,
 
     with the standard errors of cross-validation and of the final fit, the spread of the value over
-    comparable hypotheses, and a bias b of two causes: the declared parameters have a scale that is known
-    to the share s only (`ModelPrior.scale`), and a residual is unexplained. A residual whose
-    amplitude is 1/d of the effect's response shifts the magnitude by 1/d times the correlation of
-    both, of which only the usual size c (`Thresholds.rest_correlation`) is known. The bias widens
-    the interval but does not lower the confidence: `Support.mimic` covers an effect that merely
+    comparable hypotheses, and a bias b of two causes. The declared parameters have a scale that is
+    known to the share s only (`ModelPrior.scale`). A residual is unexplained: if its amplitude is
+    1/d of the effect's response, it shifts the magnitude by 1/d times the correlation of both, of
+    which only the usual size c (`Thresholds.rest_correlation`) is known. The bias widens the
+    interval but does not lower the confidence: `Support.mimic` covers an effect that merely
     resembles the residual.
     """
     posterior, errors = explanation.posterior, []

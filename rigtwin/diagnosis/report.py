@@ -15,10 +15,11 @@ from markupsafe import Markup, escape
 from rigtwin import __version__
 from rigtwin.components import KINDS
 from rigtwin.diagnosis.advice import advise
+from rigtwin.diagnosis.confounded_text import describe_confounded
 from rigtwin.diagnosis.explain import candidates
 from rigtwin.diagnosis.finding import Answer, Finding
 from rigtwin.diagnosis.overlay import Overlay
-from rigtwin.diagnosis.text import against_nominal
+from rigtwin.diagnosis.text import against_nominal, list_rivals
 from rigtwin.diagnosis.units import find_unit, shorten, spell
 from rigtwin.diagnosis.units import write as write_size
 from rigtwin.diagnosis.words import name_part
@@ -197,6 +198,8 @@ def html(diagnosis: Diagnosis) -> str:
             title_of=title_of,
             meaning_of=meaning_of,
             share_of=share_of,
+            list_rivals=list_rivals,
+            dependences=[describe_confounded(entry) for entry in answer.confounded],
             headlines=headlines(overlays, corrected),
             tested=list(dict.fromkeys(each.recording for each in overlays if each.held_out)),
             confidence=CONFIDENCE,

@@ -103,7 +103,7 @@ def _effect_lines(diagnosis: Answer) -> Iterator[str]:
         if effect.curve:
             yield f"    force at a position: {_list_curve(effect)}"
         if effect.rivals:
-            yield f"    these data cannot distinguish it from {_list_rivals(effect)}"
+            yield f"    these data cannot distinguish it from {list_rivals(effect)}"
     for entry in diagnosis.confounded:
         yield f"  {describe_confounded(entry)}"
     if (nearest := diagnosis.nearest) is not None:
@@ -180,8 +180,19 @@ def _curve_units(effect: Finding) -> tuple[str, str]:
     return units[0], units[-1]
 
 
-def _list_rivals(effect: Finding) -> str:
-    """List the rivals of an effect, with the values that they and others would have."""
+def list_rivals(effect: Finding) -> str:
+    """List the rivals of an effect, with the values that they and others would have.
+
+    Parameters
+    ----------
+    effect
+        Finding with at least one rival.
+
+    Returns
+    -------
+    str
+        Rivals, joined as in a sentence.
+    """
     return enumerate_words([_describe_rival(rival) for rival in effect.rivals])
 
 
