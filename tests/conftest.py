@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+import signal
+
 import pytest
 
 from rigtwin.recording import Recording
 from tests.helpers.recordings import EXAMPLE, beginning, shipped
+
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    # A shell's background job hands down an ignored Ctrl-C, which a user's terminal does not.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture(scope="session")

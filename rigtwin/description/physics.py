@@ -99,6 +99,9 @@ class Physics(ABC):
         Whether the model leaves out the stops at the ends of the joints' ranges.
     lacks : set of pairs
         Types of component and kinds of effect that the model does not have.
+    compounds : bool
+        Whether motions of several joints integrate the effects, so that one effect may resemble
+        several others together. The search then begins with the regular effects.
     has_contacts : bool
         Whether the model has the contacts of the MJCF.
     longest_delay : float
@@ -116,6 +119,7 @@ class Physics(ABC):
     reversible: ClassVar[bool] = False
     lacks_stops: ClassVar[bool] = False
     lacks: ClassVar[frozenset[tuple[type, str]]] = frozenset()
+    compounds: ClassVar[bool] = False
     has_contacts: ClassVar[bool] = False
     longest_delay: ClassVar[float] = math.inf
 

@@ -125,10 +125,11 @@ class HypothesisSearch:
         """
         singles = self._fit_singles()
         if self._has_gap(singles):
-            # Several free joints: the gain of one servo may resemble the friction of all joints, so
-            # the regular effects are fitted together before any climb begins with such a gain.
-            coupled = any(len(replay.free) > 1 for replay in self.evidence.machine.replays)
-            if coupled:
+            # Where effects compound, the gain of one servo may resemble the friction of all joints,
+            # so the regular effects are fitted together before a climb begins with such a gain.
+            # Where forces add up instead, a mass among them would hide the gain of a sensor.
+            compounds = self.evidence.machine.physics.compounds
+            if compounds:
                 self._fit_regulars()
             # The cheapest single effect may explain one signal alone, so the single effect of least
             # misfit over all signals is extended as well. So is dry friction: in series with a
@@ -139,7 +140,7 @@ class HypothesisSearch:
                 if fresh and self.posterior.has_unexplained_residual:
                     self._extend(fit)
             self._climb()
-            if not coupled and (
+            if not compounds and (
                 self.posterior.has_unexplained_residual
                 or len(self.posterior.best.fit.effects) > 1
                 or self._has_free_joint()

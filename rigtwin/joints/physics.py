@@ -253,6 +253,7 @@ class FreeJoints(PrescribedJoints):
     name = "free joints"
     title = "a machine of joints that act on each other, some of them free to move"
     reversible = False
+    compounds = True
     # A play adds a joint's motion of its own, for which coupled joints have no equation.
     lacks = frozenset({(Servo, "backlash")})
     longest_delay = LATE_TO_COMMAND
