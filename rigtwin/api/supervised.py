@@ -1,6 +1,7 @@
 """A supervised test on the rig's card, on a virtual card, or on the twin behind a card.
 
-`plan_test` reads a test, `dry_run` rehearses it, `run_on_twin` and `run_on_card` run it."""
+`plan_test` reads a test, `dry_run` rehearses it, `run_on_twin` and `run_on_card` run it.
+"""
 
 from __future__ import annotations
 
