@@ -67,6 +67,7 @@ def test_a_machine_without_bodies_has_none(tmp_path):
     assert find_base_parameters(described_arm(tmp_path)) == ()
 
 
+@pytest.mark.slow
 def test_machine_check_writes_the_sums(tmp_path, capsys):
     described_arm(tmp_path, TOML + BODIES)
     assert main(["machine", "check", str(tmp_path / "arm.toml")]) == 0

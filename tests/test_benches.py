@@ -62,7 +62,7 @@ def answered(truth: ActuatorTruth | DamperTruth) -> Diagnosis:
     return diagnose(find(recording.machine), [recording])
 
 
-FAST = ("friction", "play")
+FAST = ("friction",)
 """The others take longer."""
 
 

@@ -28,6 +28,7 @@ def test_a_pdf_is_a4_with_everything_unfolded(tmp_path):
     assert len(re.findall(rb"/Type /Page\b", printed)) >= 5
 
 
+@pytest.mark.slow
 @needs_browser
 def test_a_picture_is_of_the_whole_page(tmp_path):
     write_png(tmp_path / "page.png", PAGE)

@@ -14,6 +14,7 @@ SHORT = {"timing": {"duration": 2.0}, "safety": {"ramp": 0.3, "hold": 0.1}}
 NAMES = ("drop-compensated", "motorcycle-road10-compensated")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_the_card_commands_byte_for_byte_what_the_twin_does(name: str, tmp_path: Path) -> None:
     twin, card = tmp_path / "twin.mcap", tmp_path / "card.mcap"

@@ -61,6 +61,7 @@ def test_one_s_own_that_is_the_rig_s_commands_the_same(tmp_path: Path) -> None:
     assert set(recorded.controller) == {"own", "start", "preload"}
 
 
+@pytest.mark.slow
 def test_a_compensator_commands_on_the_card_what_it_does_on_the_twin(tmp_path: Path) -> None:
     twin = on_twin(tmp_path / "twin.mcap", controller=compensated)
     card = on_card(tmp_path / "card.mcap", controller=compensated)

@@ -90,6 +90,7 @@ def test_a_column_without_a_meaning_is_offered_as_the_force_with_its_factor():
     assert answer.reading.kind.test == "inverse dynamics"
 
 
+@pytest.mark.slow
 @needs_real
 def test_an_arm_with_gears_is_asked_about_once_and_read_by_formulas():
     log = [REAL / "tx40" / "pos_read_data.csv", REAL / "tx40" / "curr_data.csv"]

@@ -347,7 +347,12 @@ def truth(command: np.ndarray, viscous: float, slip: float) -> np.ndarray:
 
 
 @pytest.mark.parametrize(
-    ("viscous", "slip", "kind"), [(6.0, 0.0, None), (14.0, 0.0, "viscous"), (6.0, 2.0, "coulomb")]
+    ("viscous", "slip", "kind"),
+    [
+        pytest.param(6.0, 0.0, None, marks=pytest.mark.slow),
+        pytest.param(14.0, 0.0, "viscous", marks=pytest.mark.slow),
+        (6.0, 2.0, "coulomb"),
+    ],
 )
 def test_a_new_machine_takes_no_python(
     tmp_path: Path, viscous: float, slip: float, kind: str | None

@@ -94,6 +94,7 @@ def test_a_known_effect_is_named_in_twenty_seconds(name):
     assert_named(answer(beside(name)), name)
 
 
+@pytest.mark.slow
 def test_a_friction_taken_out_of_the_twin_is_found():
     base = without_effect(Configuration(), "coulomb@rail")
     assert base.plant.rail.coulomb == 0.0
@@ -220,6 +221,7 @@ def test_a_setting_that_only_makes_the_commands_small_is_not_named():
 SETTINGS = {"kp": 0.45, "ki": 5.0, "kff": 0.9, "filter_force": 0.013, "preload": 220.0}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "value"),
     [
@@ -237,6 +239,7 @@ def test_a_setting_that_is_not_as_told_is_named_exactly(name, value):
     assert deviation.used == pytest.approx(value, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_a_setting_without_consequence_is_a_note_and_no_gap():
     recording = recorded("road1.6", (), 3.0)
     told = EXPERIMENTS["road1.6"].configuration.controller.start - 1e-7

@@ -40,6 +40,7 @@ def bench(drift: float, coulomb: float) -> Recording:
     return Recording(Path("bench"), "damper-bench", "", PERIOD, TIME, columns, {})
 
 
+@pytest.mark.slow
 def test_a_drift_is_found_beside_friction():
     answer = rigtwin.diagnose(bench(3.0, 25.0), machine="damper-bench")
     found = {str(each.name): next(iter(each.parameters.values())) for each in answer.effects}

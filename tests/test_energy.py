@@ -152,6 +152,7 @@ def test_what_sensors_say_of_it_is_what_there_was(experiment):
         assert told == pytest.approx(there, abs=0.03 * true.damped), name
 
 
+@pytest.mark.slow
 def test_a_diagnosis_of_a_hybrid_test_says_it(tmp_path):
     rig = rigtwin.machine("suspension-rig")
     test = rigtwin.run(
@@ -165,6 +166,7 @@ def test_a_diagnosis_of_a_hybrid_test_says_it(tmp_path):
     assert "Energy error of the hybrid test d.mcap" in answer._repr_html_()
 
 
+@pytest.mark.slow
 def test_of_a_compensated_test_with_its_settings():
     """The plate's commands are not where it should be then; the models' own motion is."""
     rig = rigtwin.machine("suspension-rig")

@@ -24,7 +24,10 @@ USES = {
 """Package → a statement that needs it, and what is said without it."""
 
 
-@pytest.mark.parametrize("package", USES)
+@pytest.mark.parametrize(
+    "package",
+    [pytest.param(name, marks=pytest.mark.slow if name == "viser" else ()) for name in USES],
+)
 def test_a_missing_package_is_named_in_one_line(package):
     statement, line = USES[package]
     program = f"import sys; sys.modules[{package!r}] = None\nimport rigtwin\n{statement}"

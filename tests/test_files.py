@@ -191,6 +191,7 @@ def test_a_recording_needs_a_file_before_the_test_runs(tmp_path, capsys, monkeyp
     assert said == f"rigtwin: cannot record to {path}: it is no file but a device or a pipe\n"
 
 
+@pytest.mark.slow
 def test_an_import_onto_a_full_disk_leaves_nothing_that_is_cut(tmp_path):
     rows = "\n".join(f"{0.001 * n:.3f},{(n * 7919) % 1000 / 997:.9f}" for n in range(30_000))
     (tmp_path / "log.csv").write_text(f"t,x\n{rows}\n")

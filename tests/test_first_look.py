@@ -17,6 +17,7 @@ def looks_at(**effects: float) -> tuple[list[rigtwin.FirstLook], rigtwin.Diagnos
     return found, rigtwin.diagnose(test, first_look=found.append)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "value", "sensor"),
     [

@@ -74,6 +74,7 @@ def test_semi_active_quarter_car():
     )
 
 
+@pytest.mark.slow
 def test_beams_on_a_quarter_car_against_all_78_freedoms():
     settings = Settings(structure=Structure.BEAM)
     mass, _ = assembled(settings)

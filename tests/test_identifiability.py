@@ -87,6 +87,7 @@ def test_a_mass_and_its_friction_scale_like_the_force_that_moves_them(tmp_path):
     assert not can.unseen
 
 
+@pytest.mark.slow
 def test_an_actuator_that_is_watched_directly_hides_nothing():
     can = rigtwin.identifiability(rigtwin.machine("position-actuator"))
     assert not can.unseen

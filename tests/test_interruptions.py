@@ -70,6 +70,7 @@ def test_an_interruption_that_a_package_makes_an_import_error_of_is_one(monkeypa
     assert capsys.readouterr().err == "rigtwin: interrupted\n"
 
 
+@pytest.mark.slow
 def test_a_referee_that_still_records_says_nothing_of_an_interruption(tmp_path, capfd):
     def interrupt(*_: int) -> None:
         raise KeyboardInterrupt

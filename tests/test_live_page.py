@@ -99,6 +99,7 @@ def test_what_is_no_recording_ends_the_page(tmp_path):
         page.wait()
 
 
+@pytest.mark.slow
 def test_the_command_prints_the_alarm_and_ends_with_ctrl_c(changed):
     command = [sys.executable, "-m", "rigtwin", "look", str(changed), "--live", "--port", "0"]
     running = subprocess.Popen(

@@ -65,6 +65,7 @@ def test_every_slider_can_be_moved_to_its_ends(look):
                 assert np.all(np.isfinite(look.predict({name: moved}).signals)), slider
 
 
+@pytest.mark.slow
 def test_a_fit_is_the_diagnosis_and_is_saved_as_a_twin(look, machine, recording, tmp_path):
     fitted = look.fit(["coulomb@guide"])
     values = dict(zip(("coulomb@guide",), fitted.values, strict=True))

@@ -225,6 +225,7 @@ def test_a_page_cannot_be_shared_with_the_world():
         stop_server(server)
 
 
+@pytest.mark.slow
 def test_the_command_ends_with_ctrl_c(look, tmp_path):
     recording = tmp_path / "shaken.mcap"
     rigtwin.run(look.machine, "shake", seed=1, effects={EFFECT: TRUE}, path=recording)

@@ -13,6 +13,7 @@ from rigtwin.simulation.metrics import compute_tracking, tracking_of
 from rigtwin.simulation.runner import record
 
 
+@pytest.mark.slow
 def test_table_3_5_within_a_factor_of_two():
     runs = [trial("single-mass", 0)]
     assert runs[0].configuration.timing == Timing(duration=45.0)

@@ -37,6 +37,7 @@ def names(diagnosis: rigtwin.Diagnosis) -> set[str]:
     return {str(effect.name) for effect in diagnosis.effects}
 
 
+@pytest.mark.slow
 def test_a_rig_under_another_name_is_diagnosed_like_the_shipped_one(tmp_path: Path):
     machine = rig_named(tmp_path, "my-quarter-car")
     recording = rigtwin.run(machine, "imposed", settings=SHORT, effects={"coulomb@motor": 24})

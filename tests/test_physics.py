@@ -49,6 +49,7 @@ def test_a_comparison_shows_its_gap(machine, recording):
     assert set(compared.replays) == {"encoder"}
 
 
+@pytest.mark.slow
 def test_a_diagnosis_names_the_effect(machine, recording):
     answer = rigtwin.diagnose(recording, machine=machine)
     (finding,) = answer.effects

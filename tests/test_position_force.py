@@ -60,6 +60,7 @@ def test_the_corrected_twin_has_it(hardened: rigtwin.Diagnosis):
     )
 
 
+@pytest.mark.slow
 def test_a_spring_stays_a_spring(machine: rigtwin.Machine):
     recording = rigtwin.run(
         machine, "shake", seed=1, effects=["stiffness@guide=700"], settings=SETTINGS

@@ -258,6 +258,7 @@ def test_kill_9_loses_at_most_half_a_second(tmp_path):
     assert "cut off" in recording.notes[0]
 
 
+@pytest.mark.slow
 def test_kill_9_while_the_twin_runs(tmp_path):
     path = tmp_path / "k.mcap"
     command = [

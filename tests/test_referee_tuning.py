@@ -27,6 +27,7 @@ from rigtwin.studies.tuning.run import LIMITS, TRIP, rig_trial
 from rigtwin.studies.tuning.study_file import parse_study
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("test", ["imposed", "drop", "road1.6"])
 def test_the_rigs_controller_commands_what_the_referees_does(test):
     """Both laws have one description; on one plant with the same noise they command the same."""

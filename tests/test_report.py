@@ -187,7 +187,7 @@ def test_names_from_files_cannot_write_the_page(outcomes):
 @pytest.mark.parametrize(
     ("verdict", "width"),
     [
-        ("explained", 1280),
+        pytest.param("explained", 1280, marks=pytest.mark.slow),
         *(
             pytest.param(verdict, 390, marks=() if verdict == "explained" else pytest.mark.slow)
             for verdict in VERDICTS

@@ -28,6 +28,7 @@ def test_the_first_case_has_the_published_frequencies():
     np.testing.assert_allclose(frequencies(CASES[1]), [3.612, 15.997, 38.086], atol=6e-4)
 
 
+@pytest.mark.slow
 def test_the_reference_agrees_with_an_independent_integrator():
     case, ticks = CASES[2], 120
     squares, shapes = np.linalg.eigh(STIFFNESS / case.mass)
@@ -81,6 +82,7 @@ def test_with_a_perfect_actuator_the_error_of_the_late_force_remains():
     assert ideal_test(CASES[1], ground_motion("elcentro"), softer).j4 > criteria.j4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", CASES)
 def test_the_authors_controller_reproduces_their_table(case):
     [test] = rigtwin.rths(case, compensator="sample", noise=BENCHMARK)

@@ -91,6 +91,7 @@ def test_what_is_not_in_the_loop_does_not_count():
     )
 
 
+@pytest.mark.slow
 def test_where_it_says_that_the_loop_begins_to_swing_the_twin_does():
     """The skyhook damping at which it neither grows nor decays."""
 

@@ -102,6 +102,7 @@ def test_friction_that_follows_a_voltage_is_found(folder: Path):
     assert found["lag@voltage"].value == pytest.approx(0.05, rel=0.1)
 
 
+@pytest.mark.slow
 def test_an_unused_channel_is_named_where_the_residual_changes_with_it(folder: Path):
     recording = record(folder / "log.csv", 0.0)
     answer = rigtwin.diagnose(recording, machine=rigtwin.machine(folder / "plain.toml"))

@@ -185,7 +185,13 @@ CHANGED: Mapping[str, tuple[Callable[[], str], str, float]] = {
 }
 
 
-@pytest.mark.parametrize("kind", list(CHANGED))
+@pytest.mark.parametrize(
+    "kind",
+    [
+        pytest.param(kind, marks=() if kind == "position_gain" else pytest.mark.slow)
+        for kind in CHANGED
+    ],
+)
 def test_what_is_other_about_a_servo_is_found(tmp_path: Path, kind: str) -> None:
     changed, parameter, value = CHANGED[kind]
     # A bearing that may be anything takes the place of damping in the servo.

@@ -484,6 +484,7 @@ def test_sleeping_ends_at_its_time():
     assert monotonic() >= deadline
 
 
+@pytest.mark.slow
 def test_what_was_taken_for_real_time_is_given_back():
     import gc
 

@@ -39,6 +39,7 @@ def calibration(recording):
     return find_compensator(recording, find("friction-road").configuration.controller)
 
 
+@pytest.mark.slow
 def test_reversals_are_where_the_true_velocity_changes_sign(recording):
     ticks, directions, _ = reversals(recording)
     assert len(ticks) > 100
@@ -78,6 +79,7 @@ def test_what_the_compensators_gain_with_the_nominal_force_loop(calibration):
     assert total[2] < 0.7 * total[1]
 
 
+@pytest.mark.slow
 def test_same_seed_same_settings(recording, calibration):
     again = find_compensator(recording, find("friction-road").configuration.controller)
     assert again.settings == calibration.settings
@@ -110,6 +112,7 @@ def _still(recording):
     return columns
 
 
+@pytest.mark.slow
 def test_the_command_writes_settings_that_run(recording, tmp_path, capsys):
     out = tmp_path / "compensator.toml"
     assert main(["calibrate", str(recording.path), "-o", str(out)]) == 0

@@ -238,7 +238,11 @@ def test_limits_of_the_card_reach_the_session():
 
 
 @pytest.mark.parametrize("seed", [11, pytest.param(12, marks=pytest.mark.slow)])
-@pytest.mark.parametrize("kind", HERE, ids=lambda kind: kind.name)
+@pytest.mark.parametrize(
+    "kind",
+    [pytest.param(kind, marks=() if kind in HERE[::3] else pytest.mark.slow) for kind in HERE],
+    ids=lambda kind: kind.name,
+)
 def test_every_kind_of_fault_stops_the_rig(tmp_path, kind, seed):
     [fault] = draw_faults(1, seed, [kind])
     outcome = try_fault(fault, find(fault.experiment), TABLE, tmp_path)
@@ -266,6 +270,7 @@ def test_a_fault_counts_as_visible_where_its_measurements_are_implausible(
     assert outcome.ok, outcome
 
 
+@pytest.mark.slow
 def test_blaming_the_load_cell_for_another_sensor_is_wrong(tmp_path, monkeypatch):
     [kind] = [each for each in KINDS if each.name == "stuck"]
     fault = InjectedFault(kind, "imposed-fast", 2732, 3, 36166931)

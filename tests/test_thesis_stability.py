@@ -67,6 +67,7 @@ def test_the_single_mass_disagrees_only_with_known_misprints(single):
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("table", "expected"),
     [

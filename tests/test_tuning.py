@@ -648,6 +648,7 @@ def test_settings_that_should_not_be_used_are_said_and_end_with_another_code(tmp
     assert "But no objective is certainly better" in (tmp_path / "out" / "index.html").read_text()
 
 
+@pytest.mark.slow
 def test_a_test_without_a_road_is_said_to_be_always_the_same(tmp_path, capsys):
     text = SMALL.replace('"active"', '"drop"').replace("1500.0", "90.0")
     text = text.replace("skyhook_damping", "suspension_damping")

@@ -94,6 +94,7 @@ def test_one_that_differs_by_direction_is_found(tmp_path, nominal):
     assert effect.parameters["deadband_asymmetry"].value == pytest.approx(0.06, rel=0.05)
 
 
+@pytest.mark.slow
 @NOMINAL
 def test_an_even_one_stays_one(tmp_path, nominal):
     answer = diagnosed(tmp_path, 0.05, 0.05, nominal)
