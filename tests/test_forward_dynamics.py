@@ -328,6 +328,13 @@ def test_a_search_uses_longer_steps_only_where_they_change_little(tmp_path: Path
     assert model.thin(1e-5) is model
 
 
+def test_a_fit_leaves_the_minima_of_stick_and_slip(tmp_path: Path) -> None:
+    machine, shorter = rigtwin.machine("cart-pole"), {"timing": {"duration": 6.0}}
+    record = rigtwin.run(machine, "pushes", settings=shorter, effects=["coulomb@rail=1.5"])
+    fitted = rigtwin.fit(record, ["coulomb@rail"], machine=machine)
+    assert fitted["coulomb@rail"].value == pytest.approx(1.5, rel=1e-3)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("effect", "parameter", "value"),

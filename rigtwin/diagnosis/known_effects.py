@@ -17,6 +17,7 @@ from rigtwin.diagnosis.evidence import Evidence, relative_errors
 from rigtwin.diagnosis.fit import Fit, clashes, is_possible, with_values
 from rigtwin.diagnosis.fitter import PERTURBATIONS, Fitter
 from rigtwin.diagnosis.gauss_newton import SUFFICIENT_MISFIT, take_derivatives
+from rigtwin.diagnosis.minima import leave_minimum
 from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
 
@@ -130,6 +131,7 @@ def _fit_jointly(
     # Asked before sorting: the first start is the one that the others are compared with.
     settled = _is_settled(coarse, optima)
     optima.sort(key=lambda fit: fit.misfit)
+    optima[0] = leave_minimum(coarse, optima[0])
     # A settled optimum needs no further starts nearby.
     fit = exact.refit_with_tolerances(optima[0], () if settled else PERTURBATIONS)
     progress(1)

@@ -22,6 +22,7 @@ from rigtwin.diagnosis.first_look import FirstLook, look_first
 from rigtwin.diagnosis.fit import Fit
 from rigtwin.diagnosis.fitter import Fitter, Screened
 from rigtwin.diagnosis.linearised import Linearised
+from rigtwin.diagnosis.minima import leave_minimum
 from rigtwin.diagnosis.posterior import HypothesisPosterior
 from rigtwin.diagnosis.proposals import choose_distinct, propose_additions, propose_replacements
 from rigtwin.diagnosis.regulars import choose_regulars, fit_together, start_balanced
@@ -188,7 +189,7 @@ class HypothesisSearch:
                 for start in start_balanced(self.coarse, (screened.effect,))
             ]
             fit = min(fit, *balanced, key=lambda fit: fit.misfit) if balanced else fit
-        return fit
+        return leave_minimum(self.coarse, fit)
 
     def _has_free_joint(self) -> bool:
         """Return whether a joint moves freely.

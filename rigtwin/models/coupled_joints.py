@@ -9,6 +9,7 @@ from the state that the sensors show.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from itertools import pairwise
 
 import mujoco
 import numpy as np
@@ -35,11 +36,12 @@ from rigtwin.description.machine import Machine, ReplayOf, Row
 from rigtwin.models.following import follow_command
 from rigtwin.models.forward_arrays import GuideContacts, Servos, State, StepInputs, allocate
 from rigtwin.models.forward_motion import advance
-from rigtwin.models.initial_state import InitialState, Seen, Sense
+from rigtwin.models.initial_state import InitialState, Seen
 from rigtwin.models.joint_motion import RIGID
 from rigtwin.models.joint_simulation import KEPT, LIGHTEST
 from rigtwin.models.measured_motion import ELASTIC, recover_motion
 from rigtwin.models.multibody import Multibody, inertia_at
+from rigtwin.models.windows import Window, divide
 from rigtwin.numerics.arrays import Array, clip_diverged, interpolate
 from rigtwin.numerics.memo import Memo
 from rigtwin.recording import Inputs
@@ -58,7 +60,8 @@ class CoupledJoints:
         steps: int,
         every: int = 1,
         quick: bool = False,
-        start: InitialState | None = None,
+        windows: Sequence[Window] | None = None,
+        cuts: Sequence[float] | None = None,
     ) -> None:
         """Prepare the model.
 
@@ -70,9 +73,12 @@ class CoupledJoints:
             Ticks of the recording for each tick of `inputs`.
         quick
             Whether errors of the start are linear nuisance parameters instead of being fitted.
-        start
-            Judged initial state of the same recording at the same ticks. Default: it is judged,
-            which takes as many predictions as there are free positions and velocities.
+        windows
+            Windows of the same recording at the same ticks. Default: the recording is divided,
+            which takes at least as many predictions as there are free positions and velocities.
+        cuts
+            Times at which the windows of the same recording end, s. Default: where the machine
+            has forgotten its initial state.
 
         Raises
         ------
@@ -111,10 +117,7 @@ class CoupledJoints:
         self._changed: Memo[Multibody] = Memo(KEPT)
         self._last: Memo[Array] = Memo(KEPT)
         self._starts: Memo[Array] = Memo(KEPT)
-        if start is None:
-            self._judge_start()
-        else:
-            self._start = start
+        self._windows = self._divide(cuts) if windows is None else tuple(windows)
 
     def _read_motions(self, inputs: Inputs) -> None:
         """Smooth the prescribed motions and collect the sensors that show the initial state."""
@@ -124,14 +127,13 @@ class CoupledJoints:
             for name in self._leaders
             if components[name].quantity == "position"
         }
-        seen = {
+        self._seen = {
             name: self._seen_by(name, kind)
             for name, component in components.items()
             if (kind := component.quantity) in ("position", "velocity")
             and component.channel in inputs.channels
             and self._along[name].any()
         }
-        self._start = InitialState(seen, self._bodies.place(), self._loose, self._period)
 
     def _column(self, name: str) -> Array:
         channel = self._machine.components[name].channel
@@ -148,7 +150,8 @@ class CoupledJoints:
         free = len(self._free)
         data = self._bodies.data()
         bodies = self._bodies.bodies(data, self._turning(plant))
-        inertia = inertia_at(bodies, self._start.read(plant)[0])[:free, :free]
+        place = self._state_of(0, self._ticks).read(plant)[0]
+        inertia = inertia_at(bodies, place)[:free, :free]
         smallest = np.full(len(self._guides), 1.0)
         for number, name in enumerate(self._guides):
             along = self._along[name][:free]
@@ -311,35 +314,64 @@ class CoupledJoints:
             rubs=np.array([friction_size(each, 1.0) > 0.0 for each in dry], bool),
         )
 
-    # Initial state
+    # Initial states
 
-    def _start_of(self, plant: Plant) -> Array:
-        """Return initial positions and velocities, m and m/s, shape (2, coordinates)."""
-        if self._quick or not self._start.fitted:
-            return self._start.read(plant)
-        return self._starts.recall(
-            self._key(plant), lambda: self._start.find(plant, self._sense_from(plant))
-        )
+    def _state_of(self, first: int, last: int) -> InitialState:
+        """Return the initial state of a window, not yet judged."""
+        seen = {name: each.between(first, last) for name, each in self._seen.items()}
+        return InitialState(seen, self._bodies.place(), self._loose, self._period)
 
-    def _sense_from(self, plant: Plant) -> Sense:
-        """Return a function that predicts the rows from an initial state, for some ticks."""
-        move, undisturbed = self._prepare(plant, {}), self._no_force()
-        return lambda start, ticks: self._sense(
-            plant, clip_diverged(move(start, *undisturbed, ticks))
-        )
-
-    def _judge_start(self) -> None:
-        """Decide whether the initial state has to be fitted."""
+    def _divide(self, cuts: Sequence[float] | None) -> tuple[Window, ...]:
+        """Divide the recording into windows, and judge whether their states have to be fitted."""
         plant = self._configuration.plant
         rows = {
-            number: (
-                self._seen_by(row.name, row.kind),
-                self._machine.prior.even * self._machine.form_of(row),
-            )
+            number: (row, self._machine.prior.even * self._machine.form_of(row))
             for number, row in enumerate(self.rows)
             if row.kind in ("position", "velocity")
         }
-        self._start.judge(plant, rows, self._sense_from(plant))
+        sense = self._sense_from(plant)
+
+        def judge(first: int, last: int) -> InitialState:
+            state = self._state_of(first, last)
+            judged = {
+                number: (self._seen_by(row.name, row.kind).between(first, last), form)
+                for number, (row, form) in rows.items()
+            }
+            state.judge(plant, judged, lambda start, ticks: sense(start, first, first + ticks))
+            return state
+
+        if cuts is None:
+            return divide(0, self._ticks, self._period, judge)
+        ends = [0, *(round(cut / self._period) for cut in cuts), self._ticks]
+        return tuple(Window(first, last, judge(first, last)) for first, last in pairwise(ends))
+
+    @property
+    def cuts(self) -> tuple[float, ...]:
+        """Times at which all windows but the last end, s."""
+        return tuple(window.last * self._period for window in self._windows[:-1])
+
+    def _starts_of(self, plant: Plant) -> Array:
+        """Return initial positions and velocities, m and m/s, shape (windows, 2, coordinates)."""
+        if self._quick or not any(window.state.fitted for window in self._windows):
+            return np.stack([window.state.read(plant) for window in self._windows])
+        return self._starts.recall(self._key(plant), lambda: self._find_starts(plant))
+
+    def _find_starts(self, plant: Plant) -> Array:
+        """Return the fitted initial states of all windows, shape (windows, 2, coordinates)."""
+        sense = self._sense_from(plant)
+
+        def find(window: Window) -> Array:
+            first = window.first
+            return window.state.find(plant, lambda start, n: sense(start, first, first + n))
+
+        return np.stack([find(window) for window in self._windows])
+
+    def _sense_from(self, plant: Plant) -> Callable[[Array, int, int], Array]:
+        """Return a function that predicts the rows from an initial state, between two ticks."""
+        move, undisturbed = self._prepare(plant, {}), self._no_force()
+        return lambda start, first, last: self._sense(
+            plant, clip_diverged(move(start, *undisturbed, first, last))
+        )
 
     def _seen_by(self, name: str, kind: str) -> Seen:
         measured = self._read[name][0] if name in self._read else self._column(name)
@@ -355,7 +387,7 @@ class CoupledJoints:
             *self._heavy,
             *self._bases(),
             *self._replay.moved_by,
-            *self._start.sensors,
+            *self._seen,
             "computer",
         }
         return select(plant, sorted(names))
@@ -368,24 +400,27 @@ class CoupledJoints:
 
     def _prepare(
         self, plant: Plant, shifts: Mapping[str, Array]
-    ) -> Callable[[Array, Array, Array, int], Array]:
+    ) -> Callable[[Array, Array, Array, int, int], Array]:
         """Return a function that integrates the machine.
 
         Its arguments are the initial state, shape (2, coordinates), the disturbances of coordinates
-        and guides, N, and the number of ticks.
+        and guides, N, the first tick, and the tick after the last.
         """
         multibody, turning = self._bodies_of(plant), self._turning(plant)
         inputs = self._inputs(plant, self._push(plant), self._condition(plant, self._servos))
         inputs = inputs._replace(prescribed=self._prescribe(plant, shifts)) if shifts else inputs
         contacts, size = self._contacts(plant, inputs.pushes), multibody.coordinates
 
-        def move(start: Array, disturbance: Array, guide_disturbance: Array, ticks: int) -> Array:
+        def move(
+            start: Array, disturbance: Array, guide_disturbance: Array, first: int, last: int
+        ) -> Array:
             # Compiled code knows MuJoCo's data by its address only: this name keeps it alive.
             data: mujoco.MjData = multibody.data()
             bodies = multibody.bodies(data, turning)
             h = self._period / self._steps
-            state = begin(contacts, start, inputs.prescribed, self._held, h)
-            out = np.zeros((3, size, ticks))
+            prescribed = inputs.prescribed[:, first * self._steps :]
+            state = begin(contacts, start, prescribed, self._held, h)
+            out = np.zeros((3, size, last))
             work = allocate(size, self._loose, len(self._guides), len(self._servos))
             advance(
                 bodies=bodies,
@@ -399,11 +434,11 @@ class CoupledJoints:
                 work=work,
                 h=h,
                 steps=self._steps,
-                first=0,
-                last=ticks,
+                first=first,
+                last=last,
                 out=out,
             )
-            return out
+            return out[:, :, first:]
 
         return move
 
@@ -437,13 +472,16 @@ class CoupledJoints:
 
         def compute() -> Array:
             undisturbed = self._no_force()
-            moved = self._prepare(plant, shifts or {})(
-                self._start_of(plant),
+            forces = (
                 undisturbed[0] if disturbance is None else disturbance,
                 undisturbed[1] if guide_disturbance is None else guide_disturbance,
-                self._ticks,
             )
-            return clip_diverged(moved)
+            integrate = self._prepare(plant, shifts or {})
+            parts = [
+                integrate(start, *forces, window.first, window.last)
+                for window, start in zip(self._windows, self._starts_of(plant), strict=True)
+            ]
+            return clip_diverged(parts[0] if len(parts) == 1 else np.concatenate(parts, axis=2))
 
         plain = disturbance is None and guide_disturbance is None and not shifts
         return self._last.recall(self._key(plant), compute) if plain else compute()

@@ -18,6 +18,7 @@ from rigtwin.models.basis import Passage, forms
 from rigtwin.models.coupled_joints import CoupledJoints
 from rigtwin.models.joint import SEED, SMALL
 from rigtwin.models.model import Form, Model
+from rigtwin.models.windows import correct_each
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Inputs
 from rigtwin.signals.noise import smooth, white_noise
@@ -50,7 +51,7 @@ class ForwardDynamicsModel(CoupledJoints, Model[Plant]):
             self.every,
             self._quick,
             # How well the start is known hardly depends on the integration steps.
-            self._start,
+            self._windows,
         )
 
     def thin(self, longest: float) -> ForwardDynamicsModel:
@@ -59,7 +60,8 @@ class ForwardDynamicsModel(CoupledJoints, Model[Plant]):
         plant = self._configuration.plant
         exact = self.predict(plant)
         swing = np.std(exact, axis=1)
-        quick = self._start.fitted and self._start.linear
+        states = [window.state for window in self._windows]
+        quick = any(s.fitted for s in states) and all(s.linear for s in states)
         for every, steps in self._list_grids(longest):
             if (every, steps, quick) == (1, self._steps, False):
                 break
@@ -71,6 +73,7 @@ class ForwardDynamicsModel(CoupledJoints, Model[Plant]):
                 steps,
                 every,
                 quick,
+                cuts=self.cuts,
             )
             change = coarser.predict(plant) - exact[:, ::every]
             if bool(np.all(np.sqrt(np.mean(change**2, axis=1)) <= THINNED * swing)):
@@ -93,7 +96,7 @@ class ForwardDynamicsModel(CoupledJoints, Model[Plant]):
 
     def predict(self, plant: Plant) -> Array:
         predicted = self._sense(plant, self.move(plant))
-        return self._start.correct(predicted) if self._quick else predicted
+        return correct_each(self._windows, predicted) if self._quick else predicted
 
     def predict_disturbed(self, plant: Plant, entry: str, amount: Array) -> Array:
         disturbance, guide_disturbance = self._no_force()

@@ -67,7 +67,7 @@ class ForwardDynamicsTwin(CoupledJoints):
             contacts=contacts,
             free=self._free,
             held=self._held,
-            state=begin(contacts, self._start_of(plant), inputs.prescribed, self._held, h),
+            state=begin(contacts, self._starts_of(plant)[0], inputs.prescribed, self._held, h),
             inputs=inputs,
             laws=[push_law(pusher_of(plant, name)) for name in self._servos],
             drives=[self._drive(plant, name, h) for name in outputs],

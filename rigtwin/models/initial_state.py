@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -42,6 +42,10 @@ class Seen:
     along: Array
     zero: float
     measured: Array
+
+    def between(self, first: int, last: int) -> Seen:
+        """Return the sensor with the part of its signal between two ticks."""
+        return replace(self, measured=self.measured[first:last])
 
 
 @dataclass(frozen=True)
@@ -89,18 +93,19 @@ class InitialState:
         Number of free coordinates; they come first.
     period
         Time from tick to tick, s.
+
+    Attributes
+    ----------
+    growth : float
+        Largest factor by which an error of a position grows until the last tick, by `judge`.
     """
 
     def __init__(self, seen: Mapping[str, Seen], place: Array, loose: int, period: float) -> None:
         self._seen, self._place, self._loose, self._period = dict(seen), place, loose, period
         self._judged: Judged | None = None
+        self.growth = 1.0
         placed = [each.along for each in self._seen.values() if each.kind == "position"]
         self._unplaced = ~np.any(np.array(placed).reshape(-1, len(place)) != 0.0, axis=0)
-
-    @property
-    def sensors(self) -> tuple[str, ...]:
-        """Names of the sensors that the state is read from."""
-        return tuple(self._seen)
 
     @property
     def fitted(self) -> bool:
@@ -175,6 +180,7 @@ class InitialState:
         predict, first = self._from(start, every_row, sense, ticks), self._free(start)
         responses = find_slopes(predict, first, errors, whole.ravel())
         responses = responses.reshape(len(whole), ticks, -1)
+        self.growth = self._find_growth(rows, responses, errors)
         by_row = responses[numbers]
         # Largest effect of any error at each tick, in standard deviations: its square sum is the χ²
         # that a wrong initial state costs.
@@ -191,6 +197,19 @@ class InitialState:
             ticks=remembered,
             responses=responses,
         )
+
+    def _find_growth(
+        self, rows: Mapping[int, tuple[Seen, float]], responses: Array, errors: Array
+    ) -> float:
+        """Return the largest factor by which an error of a joint's position grows in a sensor."""
+        growth = 1.0
+        for row, (seen, _) in rows.items():
+            for joint in np.nonzero(seen.along[: self._loose])[0]:
+                if seen.kind == "position":
+                    begun = abs(seen.along[joint] * errors[joint])
+                    largest = float(np.max(np.abs(responses[row, :, joint])))
+                    growth = max(growth, largest / max(begun, 1e-300))
+        return growth
 
     @property
     def linear(self) -> bool:
