@@ -45,7 +45,7 @@ from rigtwin.models.windows import Window, divide
 from rigtwin.numerics.arrays import Array, clip_diverged, interpolate
 from rigtwin.numerics.memo import Memo
 from rigtwin.recording import Inputs
-from rigtwin.signals.noise import smooth
+from rigtwin.signals.noise import smallest_step, smooth, white_noise
 
 
 class CoupledJoints:
@@ -117,6 +117,7 @@ class CoupledJoints:
         self._changed: Memo[Multibody] = Memo(KEPT)
         self._last: Memo[Array] = Memo(KEPT)
         self._starts: Memo[Array] = Memo(KEPT)
+        self._moved: Memo[tuple[Array, Array]] = Memo(KEPT)
         self._windows = self._divide(cuts) if windows is None else tuple(windows)
 
     def _read_motions(self, inputs: Inputs) -> None:
@@ -352,9 +353,35 @@ class CoupledJoints:
 
     def _starts_of(self, plant: Plant) -> Array:
         """Return initial positions and velocities, m and m/s, shape (windows, 2, coordinates)."""
-        if self._quick or not any(window.state.fitted for window in self._windows):
-            return np.stack([window.state.read(plant) for window in self._windows])
+        if not any(window.state.fitted for window in self._windows):
+            return self._read_starts(plant)
+        if self._quick:
+            return self._move_starts(plant)[0]
         return self._starts.recall(self._key(plant), lambda: self._find_starts(plant))
+
+    def _read_starts(self, plant: Plant) -> Array:
+        """Return the initial states as read, shape (windows, 2, coordinates)."""
+        return np.stack([window.state.read(plant) for window in self._windows])
+
+    def _move_starts(self, plant: Plant) -> tuple[Array, Array]:
+        """Return the states from which a quick prediction is corrected, and how far they are moved.
+
+        The moves are in standard errors, shape (windows, unknowns). One window alone is predicted
+        from its state as read. Where errors grow, one correction is not enough, so that the states
+        are moved by a first one.
+        """
+        read = self._read_starts(plant)
+        if len(self._windows) == 1:
+            return read, np.zeros((1, 2 * self._loose))
+        return self._moved.recall(self._key(plant), lambda: self._correct_starts(plant))
+
+    def _correct_starts(self, plant: Plant) -> tuple[Array, Array]:
+        sense = self._sense_from(plant)
+        moved = [
+            window.state.move(plant, sense(window.state.read(plant), window.first, window.last))
+            for window in self._windows
+        ]
+        return np.stack([state for state, _ in moved]), np.stack([by for _, by in moved])
 
     def _find_starts(self, plant: Plant) -> Array:
         """Return the fitted initial states of all windows, shape (windows, 2, coordinates)."""
@@ -375,7 +402,8 @@ class CoupledJoints:
 
     def _seen_by(self, name: str, kind: str) -> Seen:
         measured = self._read[name][0] if name in self._read else self._column(name)
-        return Seen(kind, self._along[name], self._zero[name], measured)
+        noise = max(white_noise(measured), smallest_step(measured) / np.sqrt(12.0))
+        return Seen(kind, self._along[name], self._zero[name], measured, noise)
 
     # Motion
 

@@ -30,6 +30,8 @@ COARSER = 2.0
 may be tried longer than in models without this check."""
 THINNED = 5e-3
 """Largest change of a signal by longer steps in a search, as a share of its standard deviation."""
+UNSTABLE = 0.2
+"""The same in an unstable machine, as a share of the nominal residual."""
 
 
 class ForwardDynamicsModel(CoupledJoints, Model[Plant]):
@@ -59,7 +61,12 @@ class ForwardDynamicsModel(CoupledJoints, Model[Plant]):
         as they change next to nothing, and errors of the start taken as linear."""
         plant = self._configuration.plant
         exact = self.predict(plant)
-        swing = np.std(exact, axis=1)
+        allowed = THINNED * np.std(exact, axis=1)
+        if len(self._windows) > 1:
+            # Where small errors grow, what the model lacks moves the fitted states more than that.
+            # Both shrink together in the course of a search.
+            observed = np.stack([self._signals.column(*row.channel) for row in self.rows])
+            allowed = np.maximum(allowed, UNSTABLE * np.std(exact - observed, axis=1))
         states = [window.state for window in self._windows]
         quick = any(s.fitted for s in states) and all(s.linear for s in states)
         for every, steps in self._list_grids(longest):
@@ -76,7 +83,7 @@ class ForwardDynamicsModel(CoupledJoints, Model[Plant]):
                 cuts=self.cuts,
             )
             change = coarser.predict(plant) - exact[:, ::every]
-            if bool(np.all(np.sqrt(np.mean(change**2, axis=1)) <= THINNED * swing)):
+            if bool(np.all(np.sqrt(np.mean(change**2, axis=1)) <= allowed)):
                 return coarser
         return self
 
@@ -96,7 +103,9 @@ class ForwardDynamicsModel(CoupledJoints, Model[Plant]):
 
     def predict(self, plant: Plant) -> Array:
         predicted = self._sense(plant, self.move(plant))
-        return correct_each(self._windows, predicted) if self._quick else predicted
+        if not self._quick:
+            return predicted
+        return correct_each(self._windows, predicted, self._move_starts(plant)[1])
 
     def predict_disturbed(self, plant: Plant, entry: str, amount: Array) -> Array:
         disturbance, guide_disturbance = self._no_force()

@@ -3,20 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from rigtwin.components.plant import Plant
 from rigtwin.components.sensors import sensor_of
 from rigtwin.models.joint_start import FORGOTTEN, SHOWS, guess_place
-from rigtwin.models.start import ERRORS, LIKELY, find_slopes, fit_start, read_start, start_error
+from rigtwin.models.start import (
+    CLOSE,
+    ERRORS,
+    LIKELY,
+    find_slopes,
+    fit_start,
+    read_start,
+    start_error,
+)
 from rigtwin.numerics.arrays import Array
-from rigtwin.signals.noise import smallest_step, white_noise
 
 FIRMNESS, CLOSELY = 1e-3, 10.0
 """Least-squares weights of a joint's position in the MJCF and of a measured velocity. A measured
 position and its slope have weight 1."""
+PASSES = 3
+"""Largest number of times that the derivatives are taken at a new state."""
+FALLS = 0.6
+"""Share to which a pass must lower the residual for another one to follow."""
 Sense = Callable[[Array, int], Array]
 """Function of an initial state, shape (2, coordinates), and a number of ticks that returns the
 predicted rows, shape (rows, ticks)."""
@@ -36,16 +47,22 @@ class Seen:
         Position of the sensor at zero coordinates, m.
     measured : Array
         Signal of the sensor, shape (ticks,).
+    noise : float
+        Standard deviation of a sample.
+    earlier : Array
+        Signal before the first tick, shape (earlier ticks,).
     """
 
     kind: str
     along: Array
     zero: float
     measured: Array
+    noise: float
+    earlier: Array = field(default_factory=lambda: np.empty(0))
 
     def between(self, first: int, last: int) -> Seen:
         """Return the sensor with the part of its signal between two ticks."""
-        return replace(self, measured=self.measured[first:last])
+        return replace(self, measured=self.measured[first:last], earlier=self.measured[:first])
 
 
 @dataclass(frozen=True)
@@ -104,6 +121,11 @@ class InitialState:
         self._seen, self._place, self._loose, self._period = dict(seen), place, loose, period
         self._judged: Judged | None = None
         self.growth = 1.0
+        # What the samples say does not depend on the plant.
+        self._begun = {
+            name: read_start(seen.measured, period, seen.noise, seen.earlier)
+            for name, seen in self._seen.items()
+        }
         placed = [each.along for each in self._seen.values() if each.kind == "position"]
         self._unplaced = ~np.any(np.array(placed).reshape(-1, len(place)) != 0.0, axis=0)
 
@@ -127,7 +149,7 @@ class InitialState:
         speeds: list[Array] = [np.zeros(len(self._place))]
         for name, seen in self._seen.items():
             sensor = sensor_of(plant, name)
-            value, slope = read_start(seen.measured, self._period)
+            value, slope = self._begun[name]
             value = (value - sensor.offset) / sensor.gain
             if seen.kind == "position":
                 places.append(seen.along[None])
@@ -162,10 +184,7 @@ class InitialState:
         """
         if not rows:
             return
-        noises = [
-            max(white_noise(each.measured), smallest_step(each.measured) / np.sqrt(12.0))
-            for each, _ in rows.values()
-        ]
+        noises = [each.noise for each, _ in rows.values()]
         held = np.array(
             [
                 max(form * float(np.std(each.measured)), noise, 1e-300)
@@ -176,10 +195,7 @@ class InitialState:
         errors = self._find_errors([each for each, _ in rows.values()], noises, ticks)
         start, numbers = self.read(plant), list(rows)
         whole = sense(start, ticks)
-        every_row = range(len(whole))
-        predict, first = self._from(start, every_row, sense, ticks), self._free(start)
-        responses = find_slopes(predict, first, errors, whole.ravel())
-        responses = responses.reshape(len(whole), ticks, -1)
+        responses = self._respond(start, sense, errors, whole)
         self.growth = self._find_growth(rows, responses, errors)
         by_row = responses[numbers]
         # Largest effect of any error at each tick, in standard deviations: its square sum is the χ²
@@ -219,33 +235,67 @@ class InitialState:
         """
         return not self._unplaced[: self._loose].any()
 
-    def correct(self, predicted: Array) -> Array:
+    def correct(self, predicted: Array, moved: Array) -> Array:
         """Correct a prediction for errors of the initial state, to first order.
 
-        The errors are linear nuisance parameters θ with a prior of LIKELY standard errors: with S
-        the responses and r the residual, θ = (Sᵀ S + I / LIKELY²)⁻¹ Sᵀ r. This takes one
-        integration instead of several and is accurate enough for a search.
+        This takes one integration instead of several and is accurate enough for a search.
 
         Parameters
         ----------
         predicted
-            Prediction of all rows from the state as read, shape (rows, ticks).
+            Prediction of all rows, shape (rows, ticks).
+        moved
+            Standard errors by which its initial state is off the one as read, shape (unknowns,).
 
         Returns
         -------
         array
             Corrected prediction, shape (rows, ticks).
         """
-        judged = self._judged
-        if judged is None:
+        if self._judged is None:
             return predicted
+        return predicted + self._judged.responses @ self._solve(predicted, moved)
+
+    def move(self, plant: Plant, predicted: Array) -> tuple[Array, Array]:
+        """Move the state as read by its errors, to first order.
+
+        Parameters
+        ----------
+        plant
+            Components of the machine.
+        predicted
+            Prediction of all rows from the state as read, shape (rows, ticks).
+
+        Returns
+        -------
+        tuple of arrays
+            The moved state, shape (2, coordinates), and by how many standard errors, shape
+            (unknowns,).
+        """
+        state = self.read(plant)
+        if self._judged is None:
+            return state, np.zeros(2 * self._loose)
+        errors = self._solve(predicted, np.zeros(2 * self._loose))
+        moved = self._free(state) + errors * self._judged.errors
+        state[:, : self._loose] = moved.reshape(2, -1)
+        return state, errors
+
+    def _solve(self, predicted: Array, moved: Array) -> Array:
+        """Return the errors of the initial state, in standard errors, shape (unknowns,).
+
+        They are linear nuisance parameters θ with a prior of LIKELY standard errors about the state
+        as read, from which the prediction is off by θ₀ already: with S the responses and r the
+        residual, θ = (Sᵀ S + I / LIKELY²)⁻¹ (Sᵀ r − θ₀ / LIKELY²).
+        """
+        judged = self._judged
+        assert judged is not None
         residual = judged.measured - predicted[list(judged.rows), : judged.ticks]
         # A wrong model must not be blamed on the initial state: its residual widens the tolerance.
         held = np.maximum(judged.held, np.sqrt(np.mean(residual**2, axis=1)))
         columns = judged.slopes / np.repeat(held, judged.ticks)[:, None]
         normal = columns.T @ columns + np.eye(columns.shape[1]) / LIKELY**2
-        errors = np.linalg.solve(normal, columns.T @ (residual / held[:, None]).ravel())
-        return predicted + judged.responses @ errors
+        pull = columns.T @ (residual / held[:, None]).ravel() - moved / LIKELY**2
+        return np.linalg.solve(normal, pull)
 
     def find(self, plant: Plant, sense: Sense) -> Array:
         """Return the initial state, fitted if necessary, shape (2, coordinates).
@@ -271,25 +321,49 @@ class InitialState:
         misses = [miss(each) for each in starts]
         powers = [float(np.sum(np.mean(each**2, axis=1) / judged.held**2)) for each in misses]
         best = int(np.argmin(powers))
-        start, first = starts[best], misses[best]
-        # A wrong model must not be blamed on the initial state: its residual widens the tolerance.
-        rms = np.sqrt(np.mean(first**2, axis=1))
-        fitted_start = fit_start(
-            self._from(start, judged.rows, sense, judged.ticks),
-            judged.measured.ravel(),
-            self._free(start),
-            judged.errors,
-            np.repeat(np.maximum(judged.held, rms), judged.ticks),
-            judged.slopes,
-            judged.measured.ravel() + first.ravel(),
-        )
+        start, residual = starts[best], misses[best]
+        predict = self._from(start, judged.rows, sense, judged.ticks)
+        first, slopes = self._free(start), judged.slopes
+        state, share = first, 1.0
+        for _ in range(PASSES):
+            rms = np.sqrt(np.mean(residual**2, axis=1))
+            # A wrong model must not be blamed on the initial state: its residual widens the
+            # tolerance.
+            tolerance = np.repeat(np.maximum(judged.held, rms), judged.ticks)
+            predicted = judged.measured.ravel() + residual.ravel()
+            if share < 1.0:
+                slopes = find_slopes(predict, state, share * judged.errors, predicted) / share
+            state = fit_start(
+                predict,
+                judged.measured.ravel(),
+                first,
+                judged.errors,
+                tolerance,
+                slopes,
+                predicted,
+                state,
+            )
+            if np.all(rms <= CLOSE * judged.held):
+                break
+            residual = predict(state).reshape(judged.measured.shape) - judged.measured
+            share = float(np.max(np.sqrt(np.mean(residual**2, axis=1)) / rms))
+            # Only a residual that falls much is one of the state, whose derivatives were too rough.
+            if share > FALLS:
+                break
         fitted = start.copy()
-        fitted[:, : self._loose] = fitted_start.reshape(2, -1)
+        fitted[:, : self._loose] = state.reshape(2, -1)
         return fitted
 
     def _free(self, start: Array) -> Array:
         """Return positions and velocities of the free joints, shape (2 · free joints,)."""
         return start[:, : self._loose].ravel()
+
+    def _respond(self, start: Array, sense: Sense, errors: Array, whole: Array) -> Array:
+        """Return the change of all rows by each error, shape (all rows, ticks, unknowns)."""
+        ticks = whole.shape[1]
+        predict = self._from(start, range(len(whole)), sense, ticks)
+        responses = find_slopes(predict, self._free(start), errors, whole.ravel())
+        return responses.reshape(len(whole), ticks, -1)
 
     def _from(
         self, start: Array, rows: Sequence[int], sense: Sense, ticks: int

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -18,6 +19,10 @@ BEGINNING = 0.03
 """Time from which the initial state is read, s."""
 FEWEST = 8
 """Smallest number of samples from which it is read."""
+ORDERS, CLOSE = (2, 3, 4), 1.5
+"""Orders of the polynomial. The first that leaves at most this multiple of the noise is taken."""
+NOTHING = np.empty(0)
+"""No samples."""
 # A parabola fitted to n samples of noise σ has, at its end, a standard deviation of 3σ/√n in value
 # and of 8√3·σ/(n·√n·period) = 13.9 σ/(n·√n·period) in slope, for large n. For the value, 3σ without
 # the division is on the safe side.
@@ -28,15 +33,21 @@ Start = tuple[float, float]
 """Initial position and velocity of a joint, m and m/s."""
 
 
-def read_start(measured: Array, period: float) -> Start:
-    """Read value and slope at the start by a parabola through the first samples.
+def read_start(
+    measured: Array, period: float, noise: float = math.inf, earlier: Array = NOTHING
+) -> Start:
+    """Read value and slope at the start by a polynomial through the samples around it.
 
     Parameters
     ----------
     measured
-        Measured position, m, shape (ticks,).
+        Measured position from the start on, m, shape (ticks,).
     period
         Time from tick to tick, s.
+    noise
+        Standard deviation of a sample, m. A parabola that leaves more is too stiff for the motion.
+    earlier
+        Measured position before the start, m, shape (earlier ticks,).
 
     Returns
     -------
@@ -44,7 +55,14 @@ def read_start(measured: Array, period: float) -> Start:
         Position and velocity, m and m/s.
     """
     ticks = _ticks(period, len(measured))
-    curve = np.polynomial.Polynomial.fit(np.arange(ticks) * period, measured[:ticks], 2)
+    samples = np.concatenate([earlier[-ticks:], measured[:ticks]])
+    times = (np.arange(len(samples)) - len(earlier[-ticks:])) * period
+    curve = np.polynomial.Polynomial.fit(times, samples, ORDERS[0])
+    for order in ORDERS:
+        curve = np.polynomial.Polynomial.fit(times, samples, order)
+        rest = samples - curve(times)
+        if rest @ rest <= (CLOSE * noise) ** 2 * (len(samples) - order - 1):
+            break
     return float(curve(0.0)), float(curve.deriv()(0.0))
 
 
@@ -105,7 +123,8 @@ def fit_start(
     error: Array,
     tolerance: float | Array,
     slopes: Array,
-    predicted_first: Array,
+    predicted_begun: Array,
+    begun: Array | None = None,
 ) -> Array:
     """Fit the initial state to the measured signals by damped Gauss-Newton steps.
 
@@ -127,8 +146,10 @@ def fit_start(
         Standard deviation to which the signals can be predicted at best; a number, or shape (n,).
     slopes
         Derivatives by `find_slopes`, shape (n, unknowns).
-    predicted_first
-        Prediction from `first`, shape (n,).
+    predicted_begun
+        Prediction from `begun`, shape (n,).
+    begun
+        State from which the fit begins, shape (unknowns,). Default: `first`.
 
     Returns
     -------
@@ -144,8 +165,8 @@ def fit_start(
         residual = (measured - predicted) / tolerance
         return residual, float(residual @ residual + moved @ moved / LIKELY**2)
 
-    moved = np.zeros(len(first))
-    residual, cost = weigh(predicted_first, moved)
+    moved = np.zeros(len(first)) if begun is None else (begun - first) / error
+    residual, cost = weigh(predicted_begun, moved)
     for _ in range(STEPS):
         step, before = np.linalg.solve(normal, columns.T @ residual - moved / LIKELY**2), cost
         for share in SHARES:

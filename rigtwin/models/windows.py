@@ -15,9 +15,10 @@ from dataclasses import dataclass
 from rigtwin.models.initial_state import InitialState
 from rigtwin.numerics.arrays import Array
 
-GROWN = 30.0
+GROWN = 15.0
 """Largest growth of an initial error within a window. A pendulum that swings regularly reaches 10
-within tens of periods; chaos multiplies errors by e several times a second."""
+within tens of periods; chaos multiplies errors by e several times a second, and beyond this growth
+a fitted state depends on its data too nonlinearly."""
 SHORTEST, FEWEST = 0.5, 40
 """Shortest window: time, s, and number of ticks. Each window costs two unknowns per joint."""
 
@@ -72,7 +73,7 @@ def divide(
     return tuple(part for half in halves for part in divide(*half, period, judge))
 
 
-def correct_each(windows: Sequence[Window], predicted: Array) -> Array:
+def correct_each(windows: Sequence[Window], predicted: Array, moved: Array) -> Array:
     """Correct a prediction for errors of all initial states, to first order.
 
     Parameters
@@ -80,7 +81,9 @@ def correct_each(windows: Sequence[Window], predicted: Array) -> Array:
     windows
         Windows of the recording.
     predicted
-        Prediction from the states as read, shape (rows, ticks).
+        Prediction, shape (rows, ticks).
+    moved
+        Standard errors by which each state is off the one as read, shape (windows, unknowns).
 
     Returns
     -------
@@ -88,7 +91,7 @@ def correct_each(windows: Sequence[Window], predicted: Array) -> Array:
         Corrected prediction, shape (rows, ticks).
     """
     corrected = predicted.copy()
-    for window in windows:
+    for window, by in zip(windows, moved, strict=True):
         part = slice(window.first, window.last)
-        corrected[:, part] = window.state.correct(predicted[:, part])
+        corrected[:, part] = window.state.correct(predicted[:, part], by)
     return corrected
