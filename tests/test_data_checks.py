@@ -59,6 +59,7 @@ def test_longer_recordings_of_the_stand_in_rig_have_no_fault(name):
     assert faults(beside(name)) == {}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", once_a_sort([e.name for e in candidates(RigPlant())]))
 def test_no_effect_is_taken_for_a_fault_of_the_data(tmp_path, name):
     experiment = EXPERIMENTS["imposed"]

@@ -106,6 +106,7 @@ def test_an_effect_is_felt_and_stays_finite(name, nominal):
         )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", EFFECTS)
 def test_stepwise_and_compiled_agree_with_effects(name):
     configuration = apply_effects(SHORT._replace(timing=Timing(duration=0.3)), [text(name)])

@@ -328,6 +328,7 @@ def test_a_search_uses_longer_steps_only_where_they_change_little(tmp_path: Path
     assert model.thin(1e-5) is model
 
 
+@pytest.mark.slow
 def test_a_fit_leaves_the_minima_of_stick_and_slip(tmp_path: Path) -> None:
     machine, shorter = rigtwin.machine("cart-pole"), {"timing": {"duration": 6.0}}
     record = rigtwin.run(machine, "pushes", settings=shorter, effects=["coulomb@rail=1.5"])

@@ -36,6 +36,7 @@ def read_both(path: Path, monkeypatch, selection: Selection = EVERYTHING) -> lis
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "data",
     [

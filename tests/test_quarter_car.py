@@ -85,6 +85,7 @@ LOOSE = {"compliance", "backlash", "stribeck", "cogging", "deadband"}
 """Kinds whose events fall a step earlier or later in one of two schemes: a few noise levels."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("effect", SEARCHED, ids=lambda effect: effect.name)
 def test_every_effect_does_the_same_to_both(effect, swing):
     values = size_of(effect, swing)

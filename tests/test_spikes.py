@@ -52,6 +52,7 @@ def test_reversals_are_where_the_true_velocity_changes_sign(recording):
         assert near[0] > near.min()
 
 
+@pytest.mark.slow
 def test_finds_the_friction_and_every_reversal(calibration):
     assert calibration.friction == pytest.approx(14.0, rel=0.06)
     assert calibration.detected > 0.95 * calibration.reversals

@@ -342,6 +342,7 @@ def _choose_verdict(
 def _collect_notes(evidence: Evidence, judged: _Judged, readings: SignalReadings) -> list[str]:
     return [
         *recording_notes(evidence.recordings),
+        *_prediction_notes(evidence),
         *_clipping_notes(evidence),
         *find_stops(evidence.machine, evidence.recordings),
         *find_cut_commands(evidence.machine, evidence.recordings),
@@ -362,6 +363,14 @@ def _other_explanations(
         and set(hypothesis.scored.fit.effects) != set(named)
         and hypothesis.weight >= least
     )
+
+
+def _prediction_notes(evidence: Evidence) -> list[str]:
+    return [
+        f"{recording.path.name}: {note}"
+        for recording, model in zip(evidence.recordings, evidence.models, strict=True)
+        for note in model.notes()
+    ]
 
 
 def _clipping_notes(evidence: Evidence) -> list[str]:

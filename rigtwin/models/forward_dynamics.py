@@ -121,6 +121,16 @@ class ForwardDynamicsModel(CoupledJoints, Model[Plant]):
         predicted[[row.name for row in self.rows].index(entry)] += amount
         return predicted
 
+    def notes(self) -> tuple[str, ...]:
+        if len(self._windows) == 1:
+            return ()
+        longest = max(window.ticks for window in self._windows) * self._period
+        return (
+            f"this motion is unstable, so that small errors grow: it is predicted in "
+            f"{len(self._windows)} windows of at most {longest:.2g} s, each from an initial state "
+            "that is fitted to the sensors",
+        )
+
     # Disturbances
 
     def components(self) -> tuple[str, ...]:

@@ -101,6 +101,10 @@ class Model(ABC, Generic[P]):
         """
         return None
 
+    def notes(self) -> tuple[str, ...]:
+        """Return what a reader has to know of the way in which signals are predicted."""
+        return ()
+
     def halve_steps(self) -> Model[Any]:
         """Return the model with half the integration steps, or itself if it integrates nothing."""
         return self
