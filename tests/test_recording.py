@@ -184,6 +184,13 @@ def test_foreign_files_are_refused_in_one_line(tmp_path, content, says):
     assert str(path) in str(error.value)
 
 
+def test_a_model_among_the_recordings_is_recognised(tmp_path):
+    path = tmp_path / "arm.xml"
+    path.write_text("<mujoco/>")
+    with pytest.raises(RigtwinError, match="is given as --machine"):
+        load(path)
+
+
 def test_mcap_of_something_else_is_refused(tmp_path):
     path = tmp_path / "f.mcap"
     with path.open("wb") as file:

@@ -182,10 +182,17 @@ def load(path: Path) -> Recording:
                 content.add(record)
     # mcap unpacks whatever a read returns, so a file that ends early raises struct.error.
     except (InvalidMagic, struct.error):
-        raise RigtwinError(f"{path} is not an MCAP file") from None
+        raise RigtwinError(f"{path} is not an MCAP file{_hint(path)}") from None
     except OSError as error:
         raise RigtwinError(f"cannot read {path}: {error.strerror}") from None
     return content.build(path)
+
+
+def _hint(path: Path) -> str:
+    """Return what to do with a file that describes a machine, by the ending of its name."""
+    if path.suffix.lower() not in (".xml", ".mjcf", ".urdf", ".toml"):
+        return ""
+    return "; the model or description of a machine is given as --machine (machine= in Python)"
 
 
 class FileContent:
@@ -274,7 +281,7 @@ class FileContent:
         metadata, lost, doubtful = self._metadata, self._lost, self._doubtful
         # A file without a single readable record is no damaged recording.
         if lost and not metadata and not self._channels:
-            raise RigtwinError(f"{path} is not an MCAP file")
+            raise RigtwinError(f"{path} is not an MCAP file{_hint(path)}")
         about = metadata.get(RECORD)
         if about is None:
             raise RigtwinError(
