@@ -241,9 +241,10 @@ def _add_group(
             tables[identifier(joint)]["effects"] = FREE[test]
         for name in movers if test == SERVOS else ():
             tables[name]["effects"] = FREE_SERVO
-        # Without a force from an actuator, only ratios of friction to mass can be seen.
-        if len(movers) == len(joints):
-            _add_link(mechanism, joints[-1], ["payload"], tables)
+        # Without a force from an actuator, only ratios of friction to mass can be seen. One known
+        # force is enough, since coupled joints pass it on.
+        if movers:
+            _add_link(mechanism, joints[-1], ["mass", "payload"], tables)
     implied.replays.append(replay)
 
 

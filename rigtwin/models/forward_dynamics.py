@@ -30,7 +30,7 @@ COARSER = 2.0
 may be tried longer than in models without this check."""
 THINNED = 5e-3
 """Largest change of a signal by longer steps in a search, as a share of its standard deviation."""
-UNSTABLE = 0.2
+UNSTABLE = 0.3
 """The same in an unstable machine, as a share of the nominal residual."""
 
 
@@ -94,6 +94,8 @@ class ForwardDynamicsModel(CoupledJoints, Model[Plant]):
         for every in range(most, 0, -1):
             # A record that is slow already has no ticks to spare: stiff servos need short steps.
             steps = math.ceil(every * self._period / (longest if every == 1 else COARSER * longest))
+            # The exact model's steps may be longer than a search needs.
+            steps = min(steps, self._steps * every)
             while steps <= self._steps * every:
                 yield every, steps
                 steps *= 2
