@@ -58,11 +58,13 @@ def read_start(
     samples = np.concatenate([earlier[-ticks:], measured[:ticks]])
     times = (np.arange(len(samples)) - len(earlier[-ticks:])) * period
     curve = np.polynomial.Polynomial.fit(times, samples, ORDERS[0])
-    for order in ORDERS:
-        curve = np.polynomial.Polynomial.fit(times, samples, order)
+    for order in ORDERS[1:]:
+        free = len(samples) - curve.degree() - 1
         rest = samples - curve(times)
-        if rest @ rest <= (CLOSE * noise) ** 2 * (len(samples) - order - 1):
+        # Without samples to spare, a polynomial of higher order follows the noise.
+        if free < order or rest @ rest <= (CLOSE * noise) ** 2 * free:
             break
+        curve = np.polynomial.Polynomial.fit(times, samples, order)
     return float(curve(0.0)), float(curve.deriv()(0.0))
 
 
