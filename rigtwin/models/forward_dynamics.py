@@ -31,7 +31,8 @@ may be tried longer than in models without this check."""
 THINNED = 5e-3
 """Largest change of a signal by longer steps in a search, as a share of its standard deviation."""
 UNSTABLE = 0.3
-"""The same in an unstable machine, as a share of the nominal residual."""
+"""Largest change of a signal by a search's approximations in an unstable machine, as a share of the
+nominal residual."""
 
 
 class ForwardDynamicsModel(CoupledJoints, Model[Plant]):

@@ -245,7 +245,8 @@ class InitialState:
         predicted
             Prediction of all rows, shape (rows, ticks).
         moved
-            Standard errors by which its initial state is off the one as read, shape (unknowns,).
+            Standard errors by which the prediction's initial state differs from the state as read,
+            shape (unknowns,).
 
         Returns
         -------
@@ -321,10 +322,21 @@ class InitialState:
         misses = [miss(each) for each in starts]
         powers = [float(np.sum(np.mean(each**2, axis=1) / judged.held**2)) for each in misses]
         best = int(np.argmin(powers))
-        start, residual = starts[best], misses[best]
-        predict = self._from(start, judged.rows, sense, judged.ticks)
-        first, slopes = self._free(start), judged.slopes
-        state, share = first, 1.0
+        fitted = starts[best].copy()
+        predict = self._from(fitted, judged.rows, sense, judged.ticks)
+        state = self._fit(judged, predict, self._free(fitted), misses[best])
+        fitted[:, : self._loose] = state.reshape(2, -1)
+        return fitted
+
+    def _fit(
+        self, judged: Judged, predict: Callable[[Array], Array], first: Array, residual: Array
+    ) -> Array:
+        """Fit the state of the free joints in several passes, shape (2 · free joints,).
+
+        `residual` is that of `first`, the state as read, shape (rows, ticks). A further pass takes
+        the derivatives at the state that the last one found, as chaotic motion demands.
+        """
+        slopes, state, share = judged.slopes, first, 1.0
         for _ in range(PASSES):
             rms = np.sqrt(np.mean(residual**2, axis=1))
             # A wrong model must not be blamed on the initial state: its residual widens the
@@ -350,9 +362,7 @@ class InitialState:
             # Only a residual that falls much is one of the state, whose derivatives were too rough.
             if share > FALLS:
                 break
-        fitted = start.copy()
-        fitted[:, : self._loose] = state.reshape(2, -1)
-        return fitted
+        return state
 
     def _free(self, start: Array) -> Array:
         """Return positions and velocities of the free joints, shape (2 · free joints,)."""

@@ -20,7 +20,8 @@ BEGINNING = 0.03
 FEWEST = 8
 """Smallest number of samples from which it is read."""
 ORDERS, CLOSE = (2, 3, 4), 1.5
-"""Orders of the polynomial. The first that leaves at most this multiple of the noise is taken."""
+"""Orders of the polynomial, and the largest residual, in noise standard deviations, at which no
+higher order is tried."""
 NOTHING = np.empty(0)
 """No samples."""
 # A parabola fitted to n samples of noise σ has, at its end, a standard deviation of 3σ/√n in value

@@ -83,7 +83,8 @@ def correct_each(windows: Sequence[Window], predicted: Array, moved: Array) -> A
     predicted
         Prediction, shape (rows, ticks).
     moved
-        Standard errors by which each state is off the one as read, shape (windows, unknowns).
+        Standard errors by which each window's initial state differs from the state as read, shape
+        (windows, unknowns).
 
     Returns
     -------
