@@ -9,40 +9,28 @@ from the state that the sensors show.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import cache
 from itertools import pairwise
 
 import mujoco
 import numpy as np
 
 from rigtwin.components import (
-    UNLIMITED,
-    Base,
-    Body,
-    ForceActuator,
     Guide,
-    PositionActuator,
-    Rotor,
-    Servo,
-    component_of,
 )
-from rigtwin.components.body import list_parameters, list_surplus, turn_gravity
-from rigtwin.components.conditioning import actuator, condition_all, hold
-from rigtwin.components.guide import Friction, acts, friction, friction_size
 from rigtwin.components.plant import Plant, select
 from rigtwin.components.sensors import apply_sensor, sensor_of
-from rigtwin.components.servo import Push, push_law, pusher_of
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Machine, ReplayOf, Row
-from rigtwin.models.following import follow_command
-from rigtwin.models.forward_arrays import GuideContacts, Servos, State, StepInputs, allocate
+from rigtwin.models.forward_arrays import GuideContacts, State, allocate
 from rigtwin.models.forward_motion import advance
 from rigtwin.models.initial_state import InitialState, Seen
-from rigtwin.models.joint_motion import RIGID
+from rigtwin.models.joint_drives import Drives, recorded
+from rigtwin.models.joint_layout import Layout
 from rigtwin.models.joint_simulation import KEPT, LIGHTEST
-from rigtwin.models.measured_motion import ELASTIC, recover_motion
 from rigtwin.models.multibody import Multibody, inertia_at
-from rigtwin.models.windows import Window, divide
-from rigtwin.numerics.arrays import Array, clip_diverged, interpolate
+from rigtwin.models.windows import Sense, Starts, Window, divide
+from rigtwin.numerics.arrays import Array, clip_diverged
 from rigtwin.numerics.memo import Memo
 from rigtwin.recording import Inputs
 from rigtwin.signals.noise import smallest_step, smooth, white_noise
@@ -85,47 +73,26 @@ class CoupledJoints:
         RigtwinError
             If a channel is missing.
         """
-        self.every, self._quick = every, quick
+        self.every = every
         self._machine, self._replay, self._signals = machine, replay, inputs
         self._configuration, self._steps = configuration, steps
         self._period, self._ticks = inputs.period, inputs.ticks
         self.rows: tuple[Row, ...] = replay.rows
-        components = machine.components
-        movers = [(name, components[name].component_type) for name in replay.moved_by]
-        self._pushers = [name for name, of in movers if of is ForceActuator]
-        self._servos = [name for name, of in movers if of is Servo]
-        self._leaders = [n for n in replay.moved_by if n not in (*self._pushers, *self._servos)]
-        # The free coordinates come first, the prescribed ones after them.
-        joints = [*replay.free, *(components[name].joint for name in self._leaders)]
-        guides, rotors = machine.components_of(Guide), machine.components_of(Rotor)
-        self._bodies = Multibody(machine.model, joints, guides, rotors)
-        self._heavy = {body.name: body.mjcf for body in machine.components_of(Body)}
-        self._base = next((base.name for base in machine.components_of(Base)), None)
-        self._along = {
-            name: self._bodies.express(component.acts_on) for name, component in components.items()
-        }
-        self._zero = {
-            name: self._bodies.measure(component.acts_on) for name, component in components.items()
-        }
-        self._guides = [guide.name for guide in guides if self._along[guide.name].any()]
-        self._rotors = [rotor.name for rotor in rotors if self._along[rotor.name].any()]
+        self._layout = Layout(machine, replay)
         self._loose = len(replay.free)
-        self._free = np.arange(self._loose)
-        self._held = np.arange(len(replay.free), len(joints))
         self._read_motions(inputs)
-        self._loosest = self._find_loosest()
-        self._changed: Memo[Multibody] = Memo(KEPT)
+        loosest = self._find_loosest()
+        self._drives = Drives(machine, self._layout, inputs, self._read, loosest, steps)
         self._last: Memo[Array] = Memo(KEPT)
-        self._starts: Memo[Array] = Memo(KEPT)
-        self._moved: Memo[tuple[Array, Array]] = Memo(KEPT)
-        self._windows = self._divide(cuts) if windows is None else tuple(windows)
+        windows = self._divide(cuts) if windows is None else tuple(windows)
+        self._starts = Starts(windows, quick, KEPT)
 
     def _read_motions(self, inputs: Inputs) -> None:
         """Smooth the prescribed motions and collect the sensors that show the initial state."""
         components = self._machine.components
         self._read = {
             name: smooth(self._column(name), self._period)
-            for name in self._leaders
+            for name in self._layout.leaders
             if components[name].quantity == "position"
         }
         self._seen = {
@@ -133,13 +100,11 @@ class CoupledJoints:
             for name, component in components.items()
             if (kind := component.quantity) in ("position", "velocity")
             and component.channel in inputs.channels
-            and self._along[name].any()
+            and self._layout.along[name].any()
         }
 
     def _column(self, name: str) -> Array:
-        channel = self._machine.components[name].channel
-        assert channel is not None
-        return self._signals.column(*channel)
+        return recorded(self._machine, self._signals, name)
 
     def _find_loosest(self) -> Array:
         """Return the smallest inertia that each guide can feel at the start, kg, shape (guides,).
@@ -148,179 +113,28 @@ class CoupledJoints:
         (the operational-space inertia; Khatib, IEEE Journal of Robotics and Automation 3(1), 1987).
         """
         plant = self._configuration.plant
-        free = len(self._free)
-        data = self._bodies.data()
-        bodies = self._bodies.bodies(data, self._turning(plant))
+        free = len(self._layout.free)
+        data = self._layout.bodies.data()
+        bodies = self._layout.bodies.bodies(data, self._layout.turning(plant))
         place = self._state_of(0, self._ticks).read(plant)[0]
         inertia = inertia_at(bodies, place)[:free, :free]
-        smallest = np.full(len(self._guides), 1.0)
-        for number, name in enumerate(self._guides):
-            along = self._along[name][:free]
+        smallest = np.full(len(self._layout.guides), 1.0)
+        for number, name in enumerate(self._layout.guides):
+            along = self._layout.along[name][:free]
             if along.any():
                 smallest[number] = 1.0 / max(along @ np.linalg.solve(inertia, along), 1e-300)
         return np.maximum(smallest, LIGHTEST)
 
-    def _turning(self, plant: Plant) -> Array:
-        """Return the rotors' inertia matrix Σ J·a·aᵀ, kg, shape (coordinates, coordinates)."""
-        size = self._bodies.coordinates
-        inertia = np.zeros((size, size))
-        for name in self._rotors:
-            along, rotor = self._along[name], component_of(plant, name, Rotor)
-            inertia += rotor.inertia * np.outer(along, along)
-        return inertia
-
     def _bodies_of(self, plant: Plant) -> Multibody:
         """Return the rigid bodies with the plant's inertial parameters and tilt of the base."""
-        # A change of bodies recompiles the MJCF, so the last few variants are remembered.
-        key = select(plant, (*self._heavy, *self._bases()))
-        return self._changed.recall(key, lambda: self._change_bodies(plant))
-
-    def _change_bodies(self, plant: Plant) -> Multibody:
-        changed = {}
-        for name, mjcf in self._heavy.items():
-            body = component_of(plant, name, Body)
-            nominal = self._bodies.list_nominal(mjcf)
-            if list_surplus(body, *nominal).any():
-                changed[mjcf] = list_parameters(body, nominal[0], nominal[2])
-        base = None if self._base is None else component_of(plant, self._base, Base)
-        if not changed and (base is None or not any(base)):
-            return self._bodies
-        turn = None if base is None else (lambda gravity: turn_gravity(base, gravity))
-        return self._bodies.change(changed, turn)
-
-    def _bases(self) -> tuple[str, ...]:
-        return () if self._base is None else (self._base,)
-
-    # Inputs: prescribed motion, forces, guides
-
-    def _prescribe(self, plant: Plant, shifts: Mapping[str, Array]) -> Array:
-        """Return the prescribed positions at the steps, m, shape (coordinates, steps + 1).
-
-        `shifts` maps a sensor to a displacement of its measured motion, m, shape (ticks,).
-        """
-        count = self._ticks * self._steps + 1
-        positions = np.zeros((self._bodies.coordinates, count))
-        time = np.arange(self._ticks + 1) * self._period
-        fine = np.arange(count) * (self._period / self._steps)
-        for place, name in zip(self._held, self._leaders, strict=True):
-            if name in self._read:
-                signal = self._read[name][0] + shifts.get(name, 0.0)
-                position = recover_motion(sensor_of(plant, name), signal, self._period)
-            else:
-                mover = component_of(plant, name, PositionActuator)
-                late, command = plant.computer.delay, self._column(name)
-                position = follow_command(mover, command, late, self._period, self._steps)
-            position = (position - self._zero[name]) / self._along[name][place]
-            # The last step needs a position beyond the last tick: extrapolated.
-            position = np.append(position, 2.0 * position[-1] - position[-2])
-            positions[place] = position if self._steps == 1 else interpolate(time, position, fine)
-        return positions
-
-    def _condition(self, plant: Plant, names: Sequence[str]) -> Array:
-        """Return conditioned commands of actuators at the steps, shape (actuators, steps)."""
-        commands = np.zeros((len(names), self._ticks * self._steps))
-        for number, name in enumerate(names):
-            command = np.ascontiguousarray(self._column(name))
-            mover = pusher_of(plant, name)
-            conditioning = actuator(mover, plant.computer, self._period / self._steps)
-            condition_all(
-                conditioning,
-                hold(conditioning, float(command[0])),
-                command,
-                self._steps,
-                commands[number],
-            )
-        return commands
-
-    def _push(self, plant: Plant) -> Array:
-        """Return the forces of the force actuators at the steps, N, shape (actuators, steps)."""
-        forces = self._condition(plant, self._pushers)
-        for number, name in enumerate(self._pushers):
-            mover = component_of(plant, name, ForceActuator)
-            limit = self._limit(plant, name)
-            forces[number] = np.clip(mover.constant * forces[number], -limit, limit)
-        return forces
-
-    def _limit(self, plant: Plant, name: str) -> float:
-        """Return the force limit of a force actuator, N."""
-        return min(pusher_of(plant, name).force_limit, UNLIMITED)
-
-    def _serve(self, plant: Plant, commands: Array) -> Servos:
-        """Return the servos with conditioned commands at the steps, shape (servos, steps)."""
-        size, names = self._bodies.coordinates, self._servos
-        laws = [push_law(pusher_of(plant, name)) for name in names]
-        return Servos(
-            laws=np.array(laws, float).reshape(len(names), len(Push._fields)),
-            levers=np.array([self._along[name] for name in names]).reshape(-1, size),
-            zero=np.array([self._zero[name] for name in names]),
-            inertia=np.array([self._felt(self._along[name]) for name in names]),
-            commands=commands,
-        )
-
-    def _inputs(self, plant: Plant, pushes: Array, commands: Array) -> StepInputs:
-        """Return the inputs of one test without disturbances.
-
-        `pushes` are the forces of the force actuators, N, shape (actuators, steps). `commands` are
-        the conditioned commands of the servos, m, shape (servos, steps).
-        """
-        size = self._bodies.coordinates
-        return StepInputs(
-            prescribed=self._prescribe(plant, {}),
-            pushes=pushes,
-            levers=np.array([self._along[name] for name in self._pushers]).reshape(-1, size),
-            disturbance=np.zeros((size, self._ticks)),
-            guide_disturbance=np.zeros((len(self._guides), self._ticks)),
-            servos=self._serve(plant, commands),
-        )
-
-    def _contacts(self, plant: Plant, forces: Array) -> GuideContacts:
-        """Return the guides as compiled code takes them.
-
-        `forces` are those of the force actuators, N, shape (actuators, steps). They give the load
-        by which the friction of a prescribed joint is sized.
-        """
-        # Rigid dry friction has no spring of its own. A numerical one is as stiff as the step
-        # resolves; it keeps the friction single-valued, so that a sticking joint stays put.
-        guides = [component_of(plant, name, Guide) for name in self._guides]
-        h = self._period / self._steps
-        dry = [friction(guide) for guide in guides]
-        springs = np.empty(len(guides))
-        for number, (name, guide) in enumerate(zip(self._guides, guides, strict=True)):
-            rigid = RIGID * self._loosest[number] / h**2
-            # A fully prescribed guide must not see its friction jump with the sensor's noise: its
-            # spring builds the friction up over the error of the measured motion.
-            if not self._along[name][self._free].any():
-                load = float(np.sqrt(np.mean(forces**2))) if forces.size else 0.0
-                size = max(friction_size(dry[number], load), 1e-300)
-                errors = np.array(
-                    [self._read[n][1] if n in self._read else 0.0 for n in self._leaders]
-                )
-                error = float(np.linalg.norm(self._along[name][self._held] * errors))
-                rigid = 1.0 / max(ELASTIC * error / size, 1e-12 / size)
-            springs[number] = (
-                rigid if guide.compliance <= 0.0 else min(1.0 / guide.compliance, rigid)
-            )
-        size = self._bodies.coordinates
-        return GuideContacts(
-            guides=np.array(guides, float).reshape(len(guides), len(Guide._fields)),
-            dry=np.array(dry, float).reshape(len(guides), len(Friction._fields)),
-            along=np.array([self._along[name] for name in self._guides]).reshape(-1, size),
-            zero=np.array([self._zero[name] for name in self._guides]),
-            springs=springs,
-            rests=np.array(
-                [self._bodies.rest_of(self._machine.components[name]) for name in self._guides]
-            ),
-            inertia=self._loosest,
-            acts=np.array([acts(guide) for guide in guides], bool),
-            rubs=np.array([friction_size(each, 1.0) > 0.0 for each in dry], bool),
-        )
+        return self._layout.bodies_of(plant)
 
     # Initial states
 
     def _state_of(self, first: int, last: int) -> InitialState:
         """Return the initial state of a window, not yet judged."""
         seen = {name: each.between(first, last) for name, each in self._seen.items()}
-        return InitialState(seen, self._bodies.place(), self._loose, self._period)
+        return InitialState(seen, self._layout.bodies.place(), self._loose, self._period)
 
     def _divide(self, cuts: Sequence[float] | None) -> tuple[Window, ...]:
         """Divide the recording into windows, and judge whether their states have to be fitted."""
@@ -349,71 +163,34 @@ class CoupledJoints:
     @property
     def cuts(self) -> tuple[float, ...]:
         """Times at which all windows but the last end, s."""
-        return tuple(window.last * self._period for window in self._windows[:-1])
+        return tuple(window.last * self._period for window in self._starts.windows[:-1])
 
     def _starts_of(self, plant: Plant) -> Array:
         """Return initial positions and velocities, m and m/s, shape (windows, 2, coordinates)."""
-        if not any(window.state.fitted for window in self._windows):
-            return self._read_starts(plant)
-        if self._quick:
-            return self._move_starts(plant)[0]
-        return self._starts.recall(self._key(plant), lambda: self._find_starts(plant))
+        return self._starts.of(plant, self._key(plant), self._sense_from(plant))
 
-    def _read_starts(self, plant: Plant) -> Array:
-        """Return the initial states as read, shape (windows, 2, coordinates)."""
-        return np.stack([window.state.read(plant) for window in self._windows])
-
-    def _move_starts(self, plant: Plant) -> tuple[Array, Array]:
-        """Return the states from which a quick prediction is corrected, and how far they are moved.
-
-        The moves are in standard errors, shape (windows, unknowns). One window alone is predicted
-        from its state as read. Where errors grow, one correction is not enough, so that the states
-        are moved by a first one.
-        """
-        read = self._read_starts(plant)
-        if len(self._windows) == 1:
-            return read, np.zeros((1, 2 * self._loose))
-        return self._moved.recall(self._key(plant), lambda: self._correct_starts(plant))
-
-    def _correct_starts(self, plant: Plant) -> tuple[Array, Array]:
-        sense = self._sense_from(plant)
-        moved = [
-            window.state.move(plant, sense(window.state.read(plant), window.first, window.last))
-            for window in self._windows
-        ]
-        return np.stack([state for state, _ in moved]), np.stack([by for _, by in moved])
-
-    def _find_starts(self, plant: Plant) -> Array:
-        """Return the fitted initial states of all windows, shape (windows, 2, coordinates)."""
-        sense = self._sense_from(plant)
-
-        def find(window: Window) -> Array:
-            first = window.first
-            return window.state.find(plant, lambda start, n: sense(start, first, first + n))
-
-        return np.stack([find(window) for window in self._windows])
-
-    def _sense_from(self, plant: Plant) -> Callable[[Array, int, int], Array]:
+    def _sense_from(self, plant: Plant) -> Sense:
         """Return a function that predicts the rows from an initial state, between two ticks."""
-        move, undisturbed = self._prepare(plant, {}), self._no_force()
+        # Inputs are prepared by the first call: states that are known already need none.
+        prepare = cache(lambda: self._prepare(plant, {}))
+        undisturbed = self._no_force()
         return lambda start, first, last: self._sense(
-            plant, clip_diverged(move(start, *undisturbed, first, last))
+            plant, clip_diverged(prepare()(start, *undisturbed, first, last))
         )
 
     def _seen_by(self, name: str, kind: str) -> Seen:
         measured = self._read[name][0] if name in self._read else self._column(name)
         noise = max(white_noise(measured), smallest_step(measured) / np.sqrt(12.0))
-        return Seen(kind, self._along[name], self._zero[name], measured, noise)
+        return Seen(kind, self._layout.along[name], self._layout.zero[name], measured, noise)
 
     # Motion
 
     def _key(self, plant: Plant) -> tuple[object, ...]:
         """Return all components that the motion depends on, as a key of remembered motions."""
         names = {
-            *self._guides,
-            *self._rotors,
-            *self._heavy,
-            *self._bases(),
+            *self._layout.guides,
+            *self._layout.rotors,
+            *self._layout.inertial,
             *self._replay.moved_by,
             *self._seen,
             "computer",
@@ -422,8 +199,8 @@ class CoupledJoints:
 
     def _no_force(self) -> tuple[Array, Array]:
         return (
-            np.zeros((self._bodies.coordinates, self._ticks)),
-            np.zeros((len(self._guides), self._ticks)),
+            np.zeros((self._layout.bodies.coordinates, self._ticks)),
+            np.zeros((len(self._layout.guides), self._ticks)),
         )
 
     def _prepare(
@@ -434,10 +211,9 @@ class CoupledJoints:
         Its arguments are the initial state, shape (2, coordinates), the disturbances of coordinates
         and guides, N, the first tick, and the tick after the last.
         """
-        multibody, turning = self._bodies_of(plant), self._turning(plant)
-        inputs = self._inputs(plant, self._push(plant), self._condition(plant, self._servos))
-        inputs = inputs._replace(prescribed=self._prescribe(plant, shifts)) if shifts else inputs
-        contacts, size = self._contacts(plant, inputs.pushes), multibody.coordinates
+        multibody, turning = self._bodies_of(plant), self._layout.turning(plant)
+        inputs = self._drives.collect(plant, shifts)
+        contacts, size = self._drives.contacts(plant, inputs.pushes), multibody.coordinates
 
         def move(
             start: Array, disturbance: Array, guide_disturbance: Array, first: int, last: int
@@ -447,14 +223,14 @@ class CoupledJoints:
             bodies = multibody.bodies(data, turning)
             h = self._period / self._steps
             prescribed = inputs.prescribed[:, first * self._steps :]
-            state = begin(contacts, start, prescribed, self._held, h)
+            state = begin(contacts, start, prescribed, self._layout.held, h)
             out = np.zeros((3, size, last))
-            work = allocate(size, self._loose, len(self._guides), len(self._servos))
+            work = allocate(size, self._loose, len(self._layout.guides), len(self._layout.servos))
             advance(
                 bodies=bodies,
                 contacts=contacts,
-                free=self._free,
-                held=self._held,
+                free=self._layout.free,
+                held=self._layout.held,
                 state=state,
                 inputs=inputs._replace(
                     disturbance=disturbance, guide_disturbance=guide_disturbance
@@ -507,7 +283,7 @@ class CoupledJoints:
             integrate = self._prepare(plant, shifts or {})
             parts = [
                 integrate(start, *forces, window.first, window.last)
-                for window, start in zip(self._windows, self._starts_of(plant), strict=True)
+                for window, start in zip(self._starts.windows, self._starts_of(plant), strict=True)
             ]
             return clip_diverged(parts[0] if len(parts) == 1 else np.concatenate(parts, axis=2))
 
@@ -518,9 +294,9 @@ class CoupledJoints:
 
     def observe(self, row: Row, moved: Array) -> Array:
         """Return what an ideal sensor reads of a motion returned by `move`, shape (ticks,)."""
-        along = self._along[row.name]
+        along = self._layout.along[row.name]
         if row.kind == "position":
-            return along @ moved[0] + self._zero[row.name]
+            return along @ moved[0] + self._layout.zero[row.name]
         if row.kind == "velocity":
             return along @ moved[1]
         # Forces of coordinates are projected on the sensor's direction.
@@ -539,13 +315,6 @@ class CoupledJoints:
 
     def _sense(self, plant: Plant, moved: Array) -> Array:
         return self._apply_sensors(plant, self._true(moved))
-
-    def _felt(self, along: Array) -> float:
-        """Return the inertia along a direction, kg or kg m², by the guide that has it."""
-        for number, name in enumerate(self._guides):
-            if np.array_equal(self._along[name], along):
-                return float(self._loosest[number])
-        return float(np.max(self._loosest)) if len(self._loosest) else 1.0
 
 
 def begin(

@@ -18,7 +18,6 @@ from rigtwin.models.basis import Passage, forms
 from rigtwin.models.coupled_joints import CoupledJoints
 from rigtwin.models.joint import SEED, SMALL
 from rigtwin.models.model import Form, Model
-from rigtwin.models.windows import correct_each
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Inputs
 from rigtwin.signals.noise import smooth, white_noise
@@ -52,9 +51,9 @@ class ForwardDynamicsModel(CoupledJoints, Model[Plant]):
             self._configuration,
             steps,
             self.every,
-            self._quick,
+            self._starts.linear,
             # How well the start is known hardly depends on the integration steps.
-            self._windows,
+            self._starts.windows,
         )
 
     def thin(self, longest: float) -> ForwardDynamicsModel:
@@ -63,13 +62,12 @@ class ForwardDynamicsModel(CoupledJoints, Model[Plant]):
         plant = self._configuration.plant
         exact = self.predict(plant)
         allowed = THINNED * np.std(exact, axis=1)
-        if len(self._windows) > 1:
+        if len(self._starts.windows) > 1:
             # Where small errors grow, what the model lacks moves the fitted states more than that.
             # Both shrink together in the course of a search.
             observed = np.stack([self._signals.column(*row.channel) for row in self.rows])
             allowed = np.maximum(allowed, UNSTABLE * np.std(exact - observed, axis=1))
-        states = [window.state for window in self._windows]
-        quick = any(s.fitted for s in states) and all(s.linear for s in states)
+        quick = self._starts.may_be_linear
         for every, steps in self._list_grids(longest):
             if (every, steps, quick) == (1, self._steps, False):
                 break
@@ -91,7 +89,7 @@ class ForwardDynamicsModel(CoupledJoints, Model[Plant]):
     def _list_grids(self, longest: float) -> Iterator[tuple[int, int]]:
         """Yield ticks that make one, and integration steps per such tick, the cheapest first."""
         # What is prescribed is smoothed from all its samples.
-        most = 1 if self._leaders else max(int(COARSER * longest / self._period), 1)
+        most = 1 if self._layout.leaders else max(int(COARSER * longest / self._period), 1)
         for every in range(most, 0, -1):
             # A record that is slow already has no ticks to spare: stiff servos need short steps.
             steps = math.ceil(every * self._period / (longest if every == 1 else COARSER * longest))
@@ -106,31 +104,30 @@ class ForwardDynamicsModel(CoupledJoints, Model[Plant]):
 
     def predict(self, plant: Plant) -> Array:
         predicted = self._sense(plant, self.move(plant))
-        if not self._quick:
-            return predicted
-        return correct_each(self._windows, predicted, self._move_starts(plant)[1])
+        return self._starts.correct(plant, self._key(plant), self._sense_from(plant), predicted)
 
     def predict_disturbed(self, plant: Plant, entry: str, amount: Array) -> Array:
         disturbance, guide_disturbance = self._no_force()
-        if entry in self._guides:
-            guide_disturbance[self._guides.index(entry)] = amount
+        if entry in self._layout.guides:
+            guide_disturbance[self._layout.guides.index(entry)] = amount
             return self._sense(plant, self.move(plant, guide_disturbance=guide_disturbance))
-        if entry in self._leaders:
+        if entry in self._layout.leaders:
             return self._sense(plant, self.move(plant, shifts={entry: amount}))
-        if entry in self._along and entry not in {row.name for row in self.rows}:
-            disturbance += self._along[entry][:, None] * amount
+        if entry in self._layout.along and entry not in {row.name for row in self.rows}:
+            disturbance += self._layout.along[entry][:, None] * amount
             return self._sense(plant, self.move(plant, disturbance=disturbance))
         predicted = self.predict(plant)
         predicted[[row.name for row in self.rows].index(entry)] += amount
         return predicted
 
     def notes(self) -> tuple[str, ...]:
-        if len(self._windows) == 1:
+        windows = self._starts.windows
+        if len(windows) == 1:
             return ()
-        longest = max(window.ticks for window in self._windows) * self._period
+        longest = max(window.ticks for window in windows) * self._period
         return (
             f"this motion is unstable, so that small errors grow: it is predicted in "
-            f"{len(self._windows)} windows of at most {longest:.2g} s, each from an initial state "
+            f"{len(windows)} windows of at most {longest:.2g} s, each from an initial state "
             "that is fitted to the sensors",
         )
 
@@ -138,32 +135,34 @@ class ForwardDynamicsModel(CoupledJoints, Model[Plant]):
 
     def components(self) -> tuple[str, ...]:
         return (
-            *self._guides,
-            *self._rotors,
+            *self._layout.guides,
+            *self._layout.rotors,
             *self._replay.moved_by,
             *(row.name for row in self.rows),
         )
 
     def _passage(self, component: str, plant: Plant) -> tuple[Array, Array, Array]:
         """Return position, speed and force along a component's coordinate, shape (ticks,) each."""
-        moved, along = self.move(plant), self._along[component]
+        moved, along = self.move(plant), self._layout.along[component]
         if not along.any():
-            along = self._along[self.rows[0].name]
+            along = self._layout.along[self.rows[0].name]
         position, speed = along @ moved[0], along @ moved[1]
-        if component in self._pushers:
+        if component in self._layout.pushers:
             # The joints' force is that of all actuators together: take this actuator's alone.
-            pushed = self._push(plant)[self._pushers.index(component), :: self._steps]
+            pushed = self._drives.push_forces(plant)[
+                self._layout.pushers.index(component), :: self._steps
+            ]
             return position, speed, pushed
-        if component in self._servos:
+        if component in self._layout.servos:
             law = push_law(pusher_of(plant, component))
-            command = self._condition(plant, [component])[0, :: self._steps]
-            at = position + self._zero[component]
+            command = self._drives.condition(plant, [component])[0, :: self._steps]
+            at = position + self._layout.zero[component]
             passed = [push(law, *each) for each in zip(command, at, speed, strict=True)]
             return position, speed, np.array(passed)
         force = along @ moved[2] / float(along @ along)
         if not force.any():
             # No actuator acts: the force is inertia times acceleration.
-            force = self._felt(along) * np.gradient(speed, self._period)
+            force = self._drives.inertia_along(along) * np.gradient(speed, self._period)
         return position, speed, force
 
     def forms(self, component: str, plant: Plant) -> list[Form]:
@@ -173,11 +172,11 @@ class ForwardDynamicsModel(CoupledJoints, Model[Plant]):
         signal, role = force, "guide"
         if component in names:
             signal, role = self.predict(plant)[names.index(component)], "sensor"
-        elif component in (*self._pushers, *self._servos):
+        elif component in (*self._layout.pushers, *self._layout.servos):
             role = "force"
-        elif component in self._leaders:
+        elif component in self._layout.leaders:
             signal, role = position, "position"
-        elif component in self._rotors:
+        elif component in self._layout.rotors:
             role = "mass"
         return forms(role, component, Passage(signal, position, speed, force, self._period))
 
@@ -187,18 +186,18 @@ class ForwardDynamicsModel(CoupledJoints, Model[Plant]):
             size = float(np.std(self.predict(plant)[names.index(entry)]))
         else:
             position, _, force = self._passage(entry, plant)
-            size = float(np.std(position if entry in self._leaders else force))
+            size = float(np.std(position if entry in self._layout.leaders else force))
         return SMALL * max(size, 1e-9)
 
     def motion(self, component: str, plant: Plant) -> Motion:
-        known = component if component in self._along else self.rows[0].name
+        known = component if component in self._layout.along else self.rows[0].name
         return Motion(*self._passage(known, plant))
 
     def propagated_noise(self, plant: Plant) -> Array | None:
         """Return the change of the predictions by one draw of the measured motions' noise."""
         random = np.random.default_rng(SEED)
         shifts = {}
-        for name in self._leaders:
+        for name in self._layout.leaders:
             if name in self._read and self._read[name][1] > 0.0:
                 level = white_noise(self._column(name))
                 signal = self._read[name][0]

@@ -58,20 +58,25 @@ class ForwardDynamicsTwin(CoupledJoints):
         """
         h = self._period / self._steps
         multibody = self._bodies_of(plant)
-        inputs = self._inputs(plant, self._push(plant), self._condition(plant, self._servos))
-        contacts = self._contacts(plant, inputs.pushes)
+        inputs = self._drives.collect(plant, {})
+        contacts = self._drives.contacts(plant, inputs.pushes)
         data = multibody.data()
         return SteppedTwin(
-            bodies=multibody.bodies(data, self._turning(plant)),
+            bodies=multibody.bodies(data, self._layout.turning(plant)),
             owner=data,
             contacts=contacts,
-            free=self._free,
-            held=self._held,
-            state=begin(contacts, self._starts_of(plant)[0], inputs.prescribed, self._held, h),
+            free=self._layout.free,
+            held=self._layout.held,
+            state=begin(
+                contacts, self._starts_of(plant)[0], inputs.prescribed, self._layout.held, h
+            ),
             inputs=inputs,
-            laws=[push_law(pusher_of(plant, name)) for name in self._servos],
+            laws=[push_law(pusher_of(plant, name)) for name in self._layout.servos],
             drives=[self._drive(plant, name, h) for name in outputs],
-            sensing=[IdealSensor(r, self._along[r.name], self._zero[r.name]) for r in sensors],
+            sensing=[
+                IdealSensor(r, self._layout.along[r.name], self._layout.zero[r.name])
+                for r in sensors
+            ],
             h=h,
             steps=self._steps,
         )
@@ -103,7 +108,7 @@ class ForwardDynamicsTwin(CoupledJoints):
         """
         stepped = self.begin(plant, outputs, sensors)
         fields = [self._field(name) for name in outputs]
-        out = np.zeros((3, self._bodies.coordinates, self._ticks))
+        out = np.zeros((3, self._layout.bodies.coordinates, self._ticks))
         commands = np.zeros((len(outputs), self._ticks))
         for tick in range(self._ticks):
             read = readings.take(tick, stepped.sense())
@@ -115,9 +120,11 @@ class ForwardDynamicsTwin(CoupledJoints):
         mover = pusher_of(plant, name)
         model = actuator(mover, plant.computer, h)
         if isinstance(mover, Servo):
-            return SteppedActuator(model, 1.0, UNLIMITED, True, self._servos.index(name))
-        limit = self._limit(plant, name)
-        return SteppedActuator(model, mover.constant, limit, False, self._pushers.index(name))
+            return SteppedActuator(model, 1.0, UNLIMITED, True, self._layout.servos.index(name))
+        limit = self._drives.force_limit(plant, name)
+        return SteppedActuator(
+            model, mover.constant, limit, False, self._layout.pushers.index(name)
+        )
 
     def list_sensors(self) -> list[Row]:
         """Return the sensors of the joints and the quantity that each reads."""
@@ -127,7 +134,7 @@ class ForwardDynamicsTwin(CoupledJoints):
             if (kind := component.quantity)
             and component.channel is not None
             and component.acts_on
-            and self._along[name].any()
+            and self._layout.along[name].any()
         ]
 
     def _field(self, name: str) -> str:

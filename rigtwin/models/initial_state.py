@@ -113,12 +113,15 @@ class InitialState:
 
     Attributes
     ----------
+    loose : int
+        Number of free coordinates.
     growth : float
         Largest factor by which an error of a position grows until the last tick, by `judge`.
     """
 
     def __init__(self, seen: Mapping[str, Seen], place: Array, loose: int, period: float) -> None:
-        self._seen, self._place, self._loose, self._period = dict(seen), place, loose, period
+        self._seen, self._place, self._period = dict(seen), place, period
+        self.loose = loose
         self._judged: Judged | None = None
         self.growth = 1.0
         # What the samples say does not depend on the plant.
@@ -220,7 +223,7 @@ class InitialState:
         """Return the largest factor by which an error of a joint's position grows in a sensor."""
         growth = 1.0
         for row, (seen, _) in rows.items():
-            for joint in np.nonzero(seen.along[: self._loose])[0]:
+            for joint in np.nonzero(seen.along[: self.loose])[0]:
                 if seen.kind == "position":
                     begun = abs(seen.along[joint] * errors[joint])
                     largest = float(np.max(np.abs(responses[row, :, joint])))
@@ -233,7 +236,7 @@ class InitialState:
 
         It may not where no sensor shows a free joint's position: its error is too large for that.
         """
-        return not self._unplaced[: self._loose].any()
+        return not self._unplaced[: self.loose].any()
 
     def correct(self, predicted: Array, moved: Array) -> Array:
         """Correct a prediction for errors of the initial state, to first order.
@@ -275,10 +278,10 @@ class InitialState:
         """
         state = self.read(plant)
         if self._judged is None:
-            return state, np.zeros(2 * self._loose)
-        errors = self._solve(predicted, np.zeros(2 * self._loose))
+            return state, np.zeros(2 * self.loose)
+        errors = self._solve(predicted, np.zeros(2 * self.loose))
         moved = self._free(state) + errors * self._judged.errors
-        state[:, : self._loose] = moved.reshape(2, -1)
+        state[:, : self.loose] = moved.reshape(2, -1)
         return state, errors
 
     def _solve(self, predicted: Array, moved: Array) -> Array:
@@ -317,7 +320,7 @@ class InitialState:
 
         # Without a position sensor, both guesses are tried: at rest in the MJCF, and swinging.
         starts = [start]
-        if self._unplaced[: self._loose].any():
+        if self._unplaced[: self.loose].any():
             starts.append(self.read(plant, swinging=True))
         misses = [miss(each) for each in starts]
         powers = [float(np.sum(np.mean(each**2, axis=1) / judged.held**2)) for each in misses]
@@ -325,7 +328,7 @@ class InitialState:
         fitted = starts[best].copy()
         predict = self._from(fitted, judged.rows, sense, judged.ticks)
         state = self._fit(judged, predict, self._free(fitted), misses[best])
-        fitted[:, : self._loose] = state.reshape(2, -1)
+        fitted[:, : self.loose] = state.reshape(2, -1)
         return fitted
 
     def _fit(
@@ -366,7 +369,7 @@ class InitialState:
 
     def _free(self, start: Array) -> Array:
         """Return positions and velocities of the free joints, shape (2 · free joints,)."""
-        return start[:, : self._loose].ravel()
+        return start[:, : self.loose].ravel()
 
     def _respond(self, start: Array, sense: Sense, errors: Array, whole: Array) -> Array:
         """Return the change of all rows by each error, shape (all rows, ticks, unknowns)."""
@@ -382,7 +385,7 @@ class InitialState:
 
         def predict(first: Array) -> Array:
             begin = start.copy()
-            begin[:, : self._loose] = first.reshape(2, -1)
+            begin[:, : self.loose] = first.reshape(2, -1)
             return sense(begin, ticks)[list(rows)].ravel()
 
         return predict
@@ -391,10 +394,10 @@ class InitialState:
         """Return standard errors of the state as read, shape (2 · free joints,)."""
         pairs = list(zip(rows, noises, strict=True))
         noise = max((level for seen, level in pairs if seen.kind == "position"), default=0.0)
-        errors = np.repeat(np.array(start_error(noise, self._period, ticks)), self._loose)
+        errors = np.repeat(np.array(start_error(noise, self._period, ticks)), self.loose)
         errors = errors.reshape(2, -1)
         for seen, level in pairs:
-            for joint in np.nonzero(seen.along[: self._loose])[0]:
+            for joint in np.nonzero(seen.along[: self.loose])[0]:
                 if seen.kind == "velocity" and self._unplaced[joint]:
                     size = abs(float(seen.along[joint]))
                     errors[0, joint] = guess_place(seen.measured, self._period)[1] / size

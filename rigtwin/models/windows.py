@@ -9,11 +9,15 @@ techniques for ODE, in: Numerical Treatment of Inverse Problems (1983) 95].
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 
+import numpy as np
+
+from rigtwin.components.plant import Plant
 from rigtwin.models.initial_state import InitialState
 from rigtwin.numerics.arrays import Array
+from rigtwin.numerics.memo import Memo
 
 GROWN = 15.0
 """Largest growth of an initial error within a window. A pendulum that swings regularly reaches 10
@@ -21,6 +25,11 @@ within tens of periods; chaos multiplies errors by e several times a second, and
 a fitted state depends on its data too nonlinearly."""
 SHORTEST, FEWEST = 0.5, 40
 """Shortest window: time, s, and number of ticks. Each window costs two unknowns per joint."""
+
+
+Sense = Callable[[Array, int, int], Array]
+"""Function of an initial state, shape (2, coordinates), a first tick, and the tick after the last.
+It returns the predicted rows, shape (rows, ticks)."""
 
 
 @dataclass(frozen=True)
@@ -73,26 +82,110 @@ def divide(
     return tuple(part for half in halves for part in divide(*half, period, judge))
 
 
-def correct_each(windows: Sequence[Window], predicted: Array, moved: Array) -> Array:
-    """Correct a prediction for errors of all initial states, to first order.
+class Starts:
+    """Initial states from which the windows of a recording are predicted.
 
     Parameters
     ----------
     windows
-        Windows of the recording.
-    predicted
-        Prediction, shape (rows, ticks).
-    moved
-        Standard errors by which each window's initial state differs from the state as read, shape
-        (windows, unknowns).
+        Windows of the recording, in order of time.
+    linear
+        Whether errors of the initial states are linear nuisance parameters, by which predictions
+        are corrected. They are fitted otherwise.
+    remembered
+        Number of plants whose initial states are kept.
 
-    Returns
-    -------
-    array
-        Corrected prediction, shape (rows, ticks).
+    Attributes
+    ----------
+    windows : tuple of Window
+        Windows of the recording, in order of time.
+    linear : bool
+        Whether predictions have to be corrected.
     """
-    corrected = predicted.copy()
-    for window, by in zip(windows, moved, strict=True):
-        part = slice(window.first, window.last)
-        corrected[:, part] = window.state.correct(predicted[:, part], by)
-    return corrected
+
+    def __init__(self, windows: tuple[Window, ...], linear: bool, remembered: int) -> None:
+        self.windows, self.linear = windows, linear
+        self._found: Memo[Array] = Memo(remembered)
+        self._moved: Memo[tuple[Array, Array]] = Memo(remembered)
+
+    @property
+    def may_be_linear(self) -> bool:
+        """Whether predictions can be corrected for errors of the initial states, and have to be."""
+        states = [window.state for window in self.windows]
+        return any(state.fitted for state in states) and all(state.linear for state in states)
+
+    def of(self, plant: Plant, key: Hashable, sense: Sense) -> Array:
+        """Return the initial states of all windows, m and m/s, shape (windows, 2, coordinates).
+
+        Parameters
+        ----------
+        plant
+            Components of the machine.
+        key
+            Key of everything that the motion depends on.
+        sense
+            Prediction from any initial state.
+        """
+        if not any(window.state.fitted for window in self.windows):
+            return self._read(plant)
+        if self.linear:
+            return self._move(plant, key, sense)[0]
+        return self._found.recall(key, lambda: self._find(plant, sense))
+
+    def correct(self, plant: Plant, key: Hashable, sense: Sense, predicted: Array) -> Array:
+        """Correct a prediction for errors of all initial states, to first order.
+
+        Parameters
+        ----------
+        plant, key, sense
+            Machine, as for `of`.
+        predicted
+            Prediction from these initial states, shape (rows, ticks).
+
+        Returns
+        -------
+        array
+            Corrected prediction, shape (rows, ticks). It is the prediction itself where the states
+            are fitted.
+        """
+        if not self.linear:
+            return predicted
+        corrected = predicted.copy()
+        moved = self._move(plant, key, sense)[1]
+        for window, errors in zip(self.windows, moved, strict=True):
+            part = slice(window.first, window.last)
+            corrected[:, part] = window.state.correct(predicted[:, part], errors)
+        return corrected
+
+    def _read(self, plant: Plant) -> Array:
+        """Return the initial states as read, shape (windows, 2, coordinates)."""
+        return np.stack([window.state.read(plant) for window in self.windows])
+
+    def _find(self, plant: Plant, sense: Sense) -> Array:
+        """Return the fitted initial states, shape (windows, 2, coordinates)."""
+
+        def find(window: Window) -> Array:
+            first = window.first
+            return window.state.find(plant, lambda start, n: sense(start, first, first + n))
+
+        return np.stack([find(window) for window in self.windows])
+
+    def _move(self, plant: Plant, key: Hashable, sense: Sense) -> tuple[Array, Array]:
+        """Return the states that a prediction starts from, and how far they are from those read.
+
+        The distances are in standard errors, shape (windows, unknowns). One window alone is
+        predicted from its state as read. Where errors grow, one correction is not enough, so that
+        the states are moved by a first one.
+        """
+        if len(self.windows) == 1:
+            read = self._read(plant)
+            return read, np.zeros((1, 2 * self.windows[0].state.loose))
+
+        def move() -> tuple[Array, Array]:
+            moved = [
+                window.state.move(plant, sense(window.state.read(plant), window.first, window.last))
+                for window in self.windows
+            ]
+            return np.stack([state for state, _ in moved]), np.stack([by for _, by in moved])
+
+        return self._moved.recall(key, move)

@@ -1,0 +1,194 @@
+"""Inputs of coupled joints at all integration steps: prescribed motions, forces, servos, guides."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from rigtwin.components import (
+    UNLIMITED,
+    ForceActuator,
+    Guide,
+    PositionActuator,
+    component_of,
+)
+from rigtwin.components.conditioning import actuator, condition_all, hold
+from rigtwin.components.guide import Friction, acts, friction, friction_size
+from rigtwin.components.plant import Plant
+from rigtwin.components.sensors import sensor_of
+from rigtwin.components.servo import Push, push_law, pusher_of
+from rigtwin.description.machine import Machine
+from rigtwin.models.following import follow_command
+from rigtwin.models.forward_arrays import GuideContacts, Servos, StepInputs
+from rigtwin.models.joint_layout import Layout
+from rigtwin.models.joint_motion import RIGID
+from rigtwin.models.measured_motion import ELASTIC, recover_motion
+from rigtwin.numerics.arrays import Array, interpolate
+from rigtwin.recording import Inputs
+
+
+def recorded(machine: Machine, signals: Inputs, name: str) -> Array:
+    """Return the recorded signal of a component, shape (ticks,)."""
+    channel = machine.components[name].channel
+    assert channel is not None
+    return signals.column(*channel)
+
+
+class Drives:
+    """What drives coupled joints in one recording, as compiled code takes it.
+
+    Parameters
+    ----------
+    machine, layout
+        Machine, and its components in the coordinates of the joints.
+    signals
+        Recorded commands.
+    motions
+        Sensor that prescribes a motion → smoothed signal, m, shape (ticks,), and its error, m.
+    loosest
+        Smallest inertia that each guide can feel, kg, shape (guides,).
+    steps
+        Integration steps per tick.
+    """
+
+    def __init__(
+        self,
+        machine: Machine,
+        layout: Layout,
+        signals: Inputs,
+        motions: Mapping[str, tuple[Array, float]],
+        loosest: Array,
+        steps: int,
+    ) -> None:
+        self._machine, self._layout, self._signals = machine, layout, signals
+        self._read, self._loosest, self._steps = motions, loosest, steps
+        self._period, self._ticks = signals.period, signals.ticks
+
+    def prescribe(self, plant: Plant, shifts: Mapping[str, Array]) -> Array:
+        """Return the prescribed positions at the steps, m, shape (coordinates, steps + 1).
+
+        `shifts` maps a sensor to a displacement of its measured motion, m, shape (ticks,).
+        """
+        count = self._ticks * self._steps + 1
+        positions = np.zeros((self._layout.bodies.coordinates, count))
+        time = np.arange(self._ticks + 1) * self._period
+        fine = np.arange(count) * (self._period / self._steps)
+        for place, name in zip(self._layout.held, self._layout.leaders, strict=True):
+            if name in self._read:
+                signal = self._read[name][0] + shifts.get(name, 0.0)
+                position = recover_motion(sensor_of(plant, name), signal, self._period)
+            else:
+                mover = component_of(plant, name, PositionActuator)
+                late, command = plant.computer.delay, recorded(self._machine, self._signals, name)
+                position = follow_command(mover, command, late, self._period, self._steps)
+            position = (position - self._layout.zero[name]) / self._layout.along[name][place]
+            # The last step needs a position beyond the last tick: extrapolated.
+            position = np.append(position, 2.0 * position[-1] - position[-2])
+            positions[place] = position if self._steps == 1 else interpolate(time, position, fine)
+        return positions
+
+    def condition(self, plant: Plant, names: Sequence[str]) -> Array:
+        """Return conditioned commands of actuators at the steps, shape (actuators, steps)."""
+        commands = np.zeros((len(names), self._ticks * self._steps))
+        for number, name in enumerate(names):
+            command = np.ascontiguousarray(recorded(self._machine, self._signals, name))
+            mover = pusher_of(plant, name)
+            conditioning = actuator(mover, plant.computer, self._period / self._steps)
+            condition_all(
+                conditioning,
+                hold(conditioning, float(command[0])),
+                command,
+                self._steps,
+                commands[number],
+            )
+        return commands
+
+    def push_forces(self, plant: Plant) -> Array:
+        """Return the forces of the force actuators at the steps, N, shape (actuators, steps)."""
+        forces = self.condition(plant, self._layout.pushers)
+        for number, name in enumerate(self._layout.pushers):
+            mover = component_of(plant, name, ForceActuator)
+            limit = self.force_limit(plant, name)
+            forces[number] = np.clip(mover.constant * forces[number], -limit, limit)
+        return forces
+
+    def force_limit(self, plant: Plant, name: str) -> float:
+        """Return the force limit of a force actuator, N."""
+        return min(pusher_of(plant, name).force_limit, UNLIMITED)
+
+    def serve(self, plant: Plant) -> Servos:
+        """Return the servos with their conditioned commands at the steps."""
+        names = self._layout.servos
+        laws = [push_law(pusher_of(plant, name)) for name in names]
+        return Servos(
+            laws=np.array(laws, float).reshape(len(names), len(Push._fields)),
+            levers=self._layout.directions(names),
+            zero=np.array([self._layout.zero[name] for name in names]),
+            inertia=np.array([self.inertia_along(self._layout.along[name]) for name in names]),
+            commands=self.condition(plant, names),
+        )
+
+    def collect(self, plant: Plant, shifts: Mapping[str, Array]) -> StepInputs:
+        """Return the inputs of one test without disturbances.
+
+        `shifts` displace measured motions, as in `prescribe`.
+        """
+        layout = self._layout
+        return StepInputs(
+            prescribed=self.prescribe(plant, shifts),
+            pushes=self.push_forces(plant),
+            levers=layout.directions(layout.pushers),
+            disturbance=np.zeros((layout.bodies.coordinates, self._ticks)),
+            guide_disturbance=np.zeros((len(layout.guides), self._ticks)),
+            servos=self.serve(plant),
+        )
+
+    def contacts(self, plant: Plant, forces: Array) -> GuideContacts:
+        """Return the guides as compiled code takes them.
+
+        `forces` are those of the force actuators, N, shape (actuators, steps). They give the load
+        by which the friction of a prescribed joint is sized.
+        """
+        layout = self._layout
+        # Rigid dry friction has no spring of its own. A numerical one is as stiff as the step
+        # resolves; it keeps the friction single-valued, so that a sticking joint stays put.
+        guides = [component_of(plant, name, Guide) for name in layout.guides]
+        h = self._period / self._steps
+        dry = [friction(guide) for guide in guides]
+        springs = np.empty(len(guides))
+        for number, (name, guide) in enumerate(zip(layout.guides, guides, strict=True)):
+            rigid = RIGID * self._loosest[number] / h**2
+            # A fully prescribed guide must not see its friction jump with the sensor's noise: its
+            # spring builds the friction up over the error of the measured motion.
+            if not layout.along[name][layout.free].any():
+                load = float(np.sqrt(np.mean(forces**2))) if forces.size else 0.0
+                size = max(friction_size(dry[number], load), 1e-300)
+                errors = np.array(
+                    [self._read[n][1] if n in self._read else 0.0 for n in layout.leaders]
+                )
+                error = float(np.linalg.norm(layout.along[name][layout.held] * errors))
+                rigid = 1.0 / max(ELASTIC * error / size, 1e-12 / size)
+            springs[number] = (
+                rigid if guide.compliance <= 0.0 else min(1.0 / guide.compliance, rigid)
+            )
+        return GuideContacts(
+            guides=np.array(guides, float).reshape(len(guides), len(Guide._fields)),
+            dry=np.array(dry, float).reshape(len(guides), len(Friction._fields)),
+            along=layout.directions(layout.guides),
+            zero=np.array([layout.zero[name] for name in layout.guides]),
+            springs=springs,
+            rests=np.array(
+                [layout.bodies.rest_of(self._machine.components[name]) for name in layout.guides]
+            ),
+            inertia=self._loosest,
+            acts=np.array([acts(guide) for guide in guides], bool),
+            rubs=np.array([friction_size(each, 1.0) > 0.0 for each in dry], bool),
+        )
+
+    def inertia_along(self, along: Array) -> float:
+        """Return the inertia along a direction, kg or kg m², by the guide that has it."""
+        for number, name in enumerate(self._layout.guides):
+            if np.array_equal(self._layout.along[name], along):
+                return float(self._loosest[number])
+        return float(np.max(self._loosest)) if len(self._loosest) else 1.0
