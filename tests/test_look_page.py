@@ -30,7 +30,7 @@ from rigtwin.looking.starting_point import from_first_look, read_diagnosis
 from rigtwin.looking.traces import BUCKETS, mark, thin
 from tests.helpers.browser import BROWSER
 from tests.helpers.described import NOISY, described
-from tests.helpers.devtools import Tab, browser
+from tests.helpers.devtools import PATIENCE, Tab, browser
 
 EFFECT, TRUE = "coulomb@guide", 6.0
 DRAGS = 12
@@ -151,16 +151,17 @@ def test_a_person_drags_scrubs_fits_and_saves(look, page, tmp_path):
         assert value == pytest.approx(TRUE, abs=(knob.high - knob.low) / DRAGS / knob.factor)
         assert errors[least] == pytest.approx(look.predict({EFFECT: (value,)}).overall, abs=4.0)
         late = tab.ask("late")
-        # How fast it is, benchmarks/look.py measures. On a busy computer a later value overtakes an
-        # earlier one, which is not shown then.
+        # On a busy computer a later value overtakes an earlier one, which is then not shown.
         for seen in (late["text"], late["trace"]):
-            assert len(seen) >= DRAGS // 2
-            assert np.median(seen) < 1000.0, late
+            assert len(seen) >= DRAGS // 2, late
         # A second tab shows the same, and the first goes on without it.
         with running.tab(page.url) as second:
-            # The last move's prediction may arrive while the second tab opens.
-            there = opened(second).wait_for("overall()")
-            assert there == tab.ask("overall()")
+            other = opened(second)
+            # The last move's prediction may arrive in one tab before the other.
+            until = time.monotonic() + PATIENCE
+            while other.wait_for("overall()") != tab.ask("overall()"):
+                assert time.monotonic() < until, "the tabs show different values"
+                time.sleep(0.1)
         tab.ask("marked = JSON.stringify(Array.from(traces()[0][0])); true")
         drag(tab, "time, s", [0.5], steps=0)
         assert tab.wait_for("JSON.stringify(Array.from(traces()[0][0])) !== marked")
