@@ -47,6 +47,7 @@ class Servo(NamedTuple):
     backlash: Annotated[float, Quantity("m", 0.0, 100.0, NONE)] = 0.0
     rotor_share: Annotated[float, Quantity("1", 0.02, 0.98, "0.5: as much as the joint")] = 0.5
     rotor_friction: Annotated[float, Quantity("N", 0.0, 1e7, NONE)] = 0.0
+    play_compliance: Annotated[float, Quantity("m/N", 0.0, 1e3, NONE)] = 0.0
 
 
 Pusher = ForceActuator | Servo
@@ -65,13 +66,15 @@ class Play(NamedTuple):
     half: float  # Half the play, m; 0 for none.
     rotor_share: float  # Share of the joint's inertia that is the motor's rotor.
     rotor_friction: float  # Coulomb friction of the rotor, N.
+    compliance: float  # Compliance of the contact at either end of the play, m/N.
 
 
 def play_of(actuator: Pusher) -> Play:
     """Return the play between an actuator's motor and the joint; a force actuator has none."""
     if isinstance(actuator, Servo):
-        return Play(0.5 * actuator.backlash, actuator.rotor_share, actuator.rotor_friction)
-    return Play(0.0, 0.5, 0.0)
+        half = 0.5 * actuator.backlash
+        return Play(half, actuator.rotor_share, actuator.rotor_friction, actuator.play_compliance)
+    return Play(0.0, 0.5, 0.0, 0.0)
 
 
 class Push(NamedTuple):
@@ -151,15 +154,16 @@ def _force_limit(context: Context) -> Starts:
 def _backlash(context: Context) -> Starts:
     stroke, force = context.scales.stroke, context.scales.force
     plays = [share * stroke for share in (0.01, 0.04, 0.12, 0.4)]
-    values = tuple((play, 0.5, 0.1 * force) for play in plays)
-    return Starts(values, (0.002 * stroke, 0.02, 0.01 * force))
+    yielding = 0.001 * stroke / force
+    values = tuple((play, 0.5, 0.1 * force, yielding) for play in plays)
+    return Starts(values, (0.002 * stroke, 0.02, 0.01 * force, yielding))
 
 
 KINDS = (
     Kind(
         "backlash",
         "backlash",
-        ("backlash", "rotor_share", "rotor_friction"),
+        ("backlash", "rotor_share", "rotor_friction", "play_compliance"),
         "a play between the servo's motor, whose position it controls, and the joint",
         {Servo: _backlash},
     ),

@@ -34,6 +34,8 @@ from rigtwin.signals.noise import smooth
 
 KEPT = 24
 """Number of motions that are remembered."""
+CONTACT_STEPS = 4
+"""Factor on the integration steps of a joint with play, whose teeth hit each other in a few ms."""
 LIGHTEST = 1e-12
 """Smallest inertia of a joint, kg or kg m². Below it, a finite force has no finite acceleration."""
 
@@ -332,14 +334,15 @@ class JointSimulation:
         the number of ticks.
         """
         guide, inertia = self.mechanics(plant)
-        h = self._period / self._steps
+        mover = pusher_of(plant, self.mover.name)
+        play = play_of(mover)
+        steps = self._steps * (CONTACT_STEPS if play.half > 0.0 else 1)
+        h = self._period / steps
         # Dry friction without a spring of its own gets the stiffest one that the step resolves.
         rigid = RIGID * inertia.mass / h**2
         spring = rigid if guide.compliance <= 0.0 else min(1.0 / guide.compliance, rigid)
         guide_step = guide_step_of(guide, spring, self._replay.joint.rest, h)
-        mover = pusher_of(plant, self.mover.name)
         law, conditioning = push_law(mover), actuator(mover, plant.computer, h)
-        play = play_of(mover)
 
         def integrate(start: Start, disturbance: Array) -> Array:
             out = np.zeros((4, len(disturbance)))
@@ -352,7 +355,7 @@ class JointSimulation:
                 loop=self.control.loop(plant, self._period, noise),
                 disturbance=np.ascontiguousarray(disturbance),
                 period=self._period,
-                steps=self._steps,
+                steps=steps,
                 out=out,
             )
             return out

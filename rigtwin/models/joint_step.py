@@ -1,8 +1,12 @@
 """One step of a joint that a force pushes, with its dry friction implicit. Compiled.
 
 Between motor and joint there may be a play. The motor's rotor and the joint then are two masses
-whose distance, rotor minus joint, stays within ± half the play. A contact is rigid and inelastic: a
-force λ holds the distance at the edge in the steps in which it would exceed it.
+whose distance, rotor minus joint, is free within ± half the play. Beyond it, by a length b, the
+gear is a spring and damper that can only push [Nordin, Gutman, Automatica 38(10), 2002, section 3]:
+
+    λ = max(b/s + c·db/dt, 0),  c = 2·ζ·√(m/s),  1/m = 1/rotor + 1/joint
+
+with the compliance s. Without compliance a contact is rigid and inelastic.
 """
 
 from __future__ import annotations
@@ -17,6 +21,10 @@ from rigtwin.components.servo import Play
 CORRECTIONS = 4
 """Number of times that a contact force is corrected. One suffices without dry friction: only what
 sticks moves less than its inertia says."""
+
+
+CONTACT_DAMPING = 0.25
+"""Damping ratio ζ of a compliant contact: gears and belts that hit a stop rebound little."""
 
 
 @inlined
@@ -137,10 +145,16 @@ def step_behind_play(
     distance = rotor[0] + h * speed - moved[0]
     if abs(distance) > play.half:
         side = math.copysign(1.0, distance)
+        before = side * (rotor[0] - state[0]) - play.half
+        # Both masses give way to the contact's force in inverse proportion to their inertia.
+        yielding = h * h * (1.0 / heavy + 1.0 / carried)
+        # The contact's law times s, which is also defined for s = 0: s·λ = b + s·c·db/dt.
+        soft = play.compliance
+        relaxed = 2.0 * CONTACT_DAMPING * math.sqrt(soft * turning * carried / mass) / h
         for _ in range(CORRECTIONS):
             beyond = side * distance - play.half
-            # Both masses give way to the contact's force in inverse proportion to their inertia.
-            contact = max(contact + beyond / (h * h * (1.0 / heavy + 1.0 / carried)), 0.0)
+            excess = beyond + relaxed * (beyond - before) - soft * contact
+            contact = max(contact + excess / (soft + (1.0 + relaxed) * yielding), 0.0)
             speed = _shrink(freely - h * side * contact / heavy, rubbing)
             moved = _carry(guide_step, carried, state, pushed, outer + side * contact)
             distance = rotor[0] + h * speed - moved[0]

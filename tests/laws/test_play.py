@@ -88,3 +88,51 @@ def test_friction_of_the_joint_holds_it_while_the_motor_crosses_the_play() -> No
     servo = Servo(position_gain=GAIN, damping_gain=DAMPING, backlash=PLAY, rotor_share=0.5)
     position = motion_under(Guide(coulomb=0.2), command, INERTIA, servo, steps=8)[0]
     assert np.max(np.abs(position)) < 1e-3
+
+
+def euler(command: Array, share: float, compliance: float) -> Array:
+    """Return the angle of the link by explicit steps of 10 µs, rad, shape (ticks,)."""
+    rotor, link = share * INERTIA, (1.0 - share) * INERTIA
+    damping = 2.0 * 0.25 * np.sqrt(rotor * link / INERTIA / compliance)
+    h, angles = 1e-5, np.empty(len(command))
+    position, speed, angle, rate = 0.0, 0.0, 0.0, 0.0
+    for tick, value in enumerate(command):
+        angles[tick] = angle
+        for _ in range(round(PERIOD / h)):
+            wound = position - angle
+            beyond = abs(wound) - 0.5 * PLAY
+            side = 1.0 if wound > 0.0 else -1.0
+            contact = beyond / compliance + damping * side * (speed - rate)
+            contact = side * max(contact, 0.0) if beyond > 0.0 else 0.0
+            speed += h * (GAIN * (value - position) - DAMPING * speed - contact) / rotor
+            rate += h * contact / link
+            position, angle = position + h * speed, angle + h * rate
+    return angles
+
+
+@pytest.mark.parametrize("share", [0.2, 0.6])
+def test_a_gear_that_yields_moves_the_link_as_a_spring_and_a_damper_do(share: float) -> None:
+    command, compliance = commanded(700), 0.004
+    servo = Servo(
+        position_gain=GAIN,
+        damping_gain=DAMPING,
+        backlash=PLAY,
+        rotor_share=share,
+        play_compliance=compliance,
+    )
+    true = euler(command, share, compliance)
+    moved = [
+        motion_under(Guide(), command, INERTIA, each, steps=32)[0]
+        for each in (servo, servo._replace(play_compliance=0.0))
+    ]
+    yielding, rigid = (np.std(each - true) for each in moved)
+    assert yielding < 0.03 * np.std(true)
+    assert yielding < 0.3 * rigid
+
+
+def test_a_load_winds_the_gear_up_by_its_compliance() -> None:
+    servo = Servo(GAIN, DAMPING, backlash=PLAY, play_compliance=0.01)
+    load = 2.0
+    position = motion_under(Guide(offset=load), np.zeros(3000), INERTIA, servo, steps=8)[0]
+    wound = 0.5 * PLAY + 0.01 * load
+    assert abs(position[-1]) == pytest.approx(load / GAIN + wound, rel=1e-3)
