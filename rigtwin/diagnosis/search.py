@@ -58,6 +58,8 @@ VARIED = 2
 """Number of effects tried in the place of each effect while the search climbs."""
 COMPARED = 5
 """Number of effects tried in the place of each effect of the best hypothesis at the end."""
+RIVALS = 3
+"""Number of the best hypotheses whose effects are left out in turn at the end."""
 BEGINNINGS = 4
 """Number of single effects that are extended where the best hypothesis leaves a large residual."""
 SHORT = 4
@@ -153,6 +155,8 @@ class HypothesisSearch:
                 self._restart()
                 if self._improved(before) or len(before.fit.effects) <= SHORT:
                     self._climb()
+            if self.posterior.has_unexplained_residual:
+                self._reduce_closest()
             self._vary_best()
         return self.posterior
 
@@ -315,19 +319,31 @@ class HypothesisSearch:
 
     def _vary(self, leader: Fit, count: int) -> None:
         """Fit a hypothesis without each effect, and with each replaced by `count` others."""
-        price = 2.0 * self.posterior.prices.ordinary
-        starts: list[Start] = []
-        if len(leader.effects) > 1:
-            # An effect that is missed by far more than its price need not be left out in a fit.
-            starts += [
-                (rest, values)
-                for misfit, rest, values in Linearised(self.coarse, leader).leave_out_each()
-                if misfit - leader.misfit < MISSED * price
-            ]
+        starts = self._leave_out(leader)
         starts += propose_replacements(self.coarse, leader, self.effects, count, self.threads)
         starts += start_regular_instead(self.coarse, leader, self.effects)
         starts += start_merged(leader)
         self._keep(self._refine(starts))
+
+    def _leave_out(self, fit: Fit) -> list[Start]:
+        """Return a hypothesis without each effect that may be worth less than its price."""
+        if len(fit.effects) < 2:
+            return []
+        # An effect that is missed by far more than its price need not be left out in a fit.
+        most = fit.misfit + MISSED * 2.0 * self.posterior.prices.ordinary
+        reduced = Linearised(self.coarse, fit).leave_out_each()
+        return [(rest, values) for misfit, rest, values in reduced if misfit < most]
+
+    def _reduce_closest(self) -> None:
+        """Leave effects out of the hypothesis of least misfit, one after another.
+
+        A climb that began with effects that only resemble the true ones may add the true ones in
+        the end. Such a long hypothesis counts for little until the others are left out.
+        """
+        closest = min((scored.fit for scored in self.pool.values()), key=lambda fit: fit.misfit)
+        if len(closest.effects) > len(self.posterior.best.fit.effects):
+            path = Linearised(self.coarse, closest).eliminate()
+            self._keep(self._refine([(effects, values) for _, effects, values in path]))
 
     def _vary_best(self) -> None:
         """Look for rivals of the best hypothesis, until it stays the best."""
@@ -336,9 +352,15 @@ class HypothesisSearch:
         # The same hypothesis may win again after another one was the best, so the loop needs a
         # memory to end.
         varied: set[frozenset[Effect]] = set()
+        reduced: set[tuple[Effect, ...]] = set()
         while len(best := self.posterior.best.fit.effects) > 1 and frozenset(best) not in varied:
             varied.add(frozenset(best))
+            reduced.add(best)
             self._vary(self.posterior.best.fit, COMPARED)
+            # An effect that took the place of another may make a third one superfluous.
+            rivals = [fit for fit in self._ranked_fits()[:RIVALS] if fit.effects not in reduced]
+            reduced.update(fit.effects for fit in rivals)
+            self._keep(self._refine([start for fit in rivals for start in self._leave_out(fit)]))
 
     def _refine(self, starts: Sequence[Start]) -> list[Fit]:
         """Fit from the starts that were not fitted before."""
