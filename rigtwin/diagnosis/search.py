@@ -26,6 +26,7 @@ from rigtwin.diagnosis.minima import leave_minimum
 from rigtwin.diagnosis.posterior import HypothesisPosterior
 from rigtwin.diagnosis.proposals import choose_distinct, propose_additions, propose_replacements
 from rigtwin.diagnosis.regulars import choose_regulars, fit_together, start_balanced
+from rigtwin.diagnosis.rescaling import start_rescaled
 from rigtwin.diagnosis.scoring import Scored, Scorer
 from rigtwin.diagnosis.starts import (
     GATEWAY,
@@ -62,6 +63,8 @@ RIVALS = 3
 """Number of the best hypotheses whose effects are left out in turn at the end."""
 BEGINNINGS = 4
 """Number of single effects that are extended where the best hypothesis leaves a large residual."""
+FEW = 3
+"""Number of effects up to which a hypothesis is varied before it is extended further."""
 SHORT = 4
 """Number of effects up to which the variants of every leader are fitted."""
 STEADY_ROUNDS = 2
@@ -252,7 +255,12 @@ class HypothesisSearch:
             if (leader := self._next_leader()) is None:
                 return
             self._extend(leader)
-            if not self._improved(before):
+            if self._improved(before):
+                # The effects that a short hypothesis began with may only resemble the true ones.
+                best = self.posterior.best.fit
+                if 1 < len(best.effects) <= FEW and self.posterior.has_unexplained_residual:
+                    self._vary(best, VARIED)
+            else:
                 if not self.posterior.has_unexplained_residual:
                     return
                 # A long hypothesis has many variants: only those of the best one are worth a fit.
@@ -323,6 +331,7 @@ class HypothesisSearch:
         starts += propose_replacements(self.coarse, leader, self.effects, count, self.threads)
         starts += start_regular_instead(self.coarse, leader, self.effects)
         starts += start_merged(leader)
+        starts += start_rescaled(self.coarse.plant, leader, self.effects)
         self._keep(self._refine(starts))
 
     def _leave_out(self, fit: Fit) -> list[Start]:
