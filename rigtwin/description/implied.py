@@ -31,13 +31,26 @@ KEYS = ("test", "joints")
 """Keys of a replay whose components are implied."""
 PRESCRIBED = ["coulomb", "viscous", "offset", "asymmetry", "stribeck", "load_friction", "drag"]
 """Effects at coupled joints with prescribed motion."""
-FREE = {
-    FORCES: ["coulomb", "viscous", "offset", "stiffness"],
-    SERVOS: ["coulomb", "viscous", "offset"],
-}
-"""Kind of test → effects at coupled joints that are free to move. The list is short because every
-effect costs integrations of the equations of motion."""
-FREE_SERVO = ["position_gain", "damping_gain", "delay", "lag"]
+FREE = [
+    "coulomb",
+    "viscous",
+    "offset",
+    "stiffness",
+    "stribeck",
+    "load_friction",
+    "position_force",
+]
+"""Effects at coupled joints that are free to move."""
+FREE_SERVO = [
+    "gains",
+    "position_gain",
+    "damping_gain",
+    "delay",
+    "lag",
+    "force_limit",
+    "rate_limit",
+    "deadband",
+]
 """Effects of servos that move coupled joints."""
 
 
@@ -238,13 +251,13 @@ def _add_group(
     elif test in (SERVOS, FORCES):
         replay["free"] = list(joints)
         for joint in joints:
-            tables[identifier(joint)]["effects"] = FREE[test]
+            tables[identifier(joint)]["effects"] = FREE
         for name in movers if test == SERVOS else ():
             tables[name]["effects"] = FREE_SERVO
         # Without a force from an actuator, only ratios of friction to mass can be seen. One known
         # force is enough, since coupled joints pass it on.
         if movers:
-            _add_link(mechanism, joints[-1], ["mass", "payload"], tables)
+            _add_links(mechanism, joints, tables)
     implied.replays.append(replay)
 
 

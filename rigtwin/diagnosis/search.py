@@ -24,6 +24,7 @@ from rigtwin.diagnosis.fitter import Fitter, Screened
 from rigtwin.diagnosis.linearised import Linearised
 from rigtwin.diagnosis.minima import leave_minimum
 from rigtwin.diagnosis.posterior import HypothesisPosterior
+from rigtwin.diagnosis.prices import RARE
 from rigtwin.diagnosis.proposals import choose_distinct, propose_additions, propose_replacements
 from rigtwin.diagnosis.regulars import choose_regulars, fit_together, start_balanced
 from rigtwin.diagnosis.rescaling import start_rescaled
@@ -67,6 +68,9 @@ FEW = 3
 """Number of effects up to which a hypothesis is varied before it is extended further."""
 SHORT = 4
 """Number of effects up to which the variants of every leader are fitted."""
+LATER = (*RARE, "deadband", "stribeck")
+"""Kinds that are searched at several free joints only where the others leave a large residual. They
+refine dry friction, or resemble what it leaves."""
 STEADY_ROUNDS = 2
 """Rounds without a better hypothesis after which the search ends."""
 
@@ -106,6 +110,11 @@ class HypothesisSearch:
     pool: dict[frozenset[Effect], Scored] = field(default_factory=dict, init=False)
 
     def __post_init__(self) -> None:
+        replays = self.evidence.machine.replays
+        # Where several joints move freely, every effect costs integrations of all of them.
+        staged = any(len(replay.free) > 1 for replay in replays)
+        self._later = tuple(e for e in self.effects if staged and e.kind.name in LATER)
+        self._searched = tuple(e for e in self.effects if e not in self._later)
         searched = self.evidence.thin()
         self.coarse = Fitter(searched.halve_steps())
         self.fine = Fitter(searched)
@@ -158,6 +167,10 @@ class HypothesisSearch:
                 self._restart()
                 if self._improved(before) or len(before.fit.effects) <= SHORT:
                     self._climb()
+            if self._later and self.posterior.has_unexplained_residual:
+                self._searched = tuple(self.effects)
+                self._extended.clear()
+                self._climb()
             if self.posterior.has_unexplained_residual:
                 self._reduce_closest()
             self._vary_best()
@@ -175,7 +188,11 @@ class HypothesisSearch:
         self.on_first_look(look_first(self.coarse, self.screened, price, self.thresholds))
         most = max((screened.promise for screened in self.screened), default=0.0)
         least = self.thresholds.promising_share * max(most, price)
-        promising = [screened for screened in self.screened if screened.promise >= least]
+        promising = [
+            screened
+            for screened in self.screened
+            if screened.promise >= least and screened.effect in self._searched
+        ]
         singles = sorted(self.threads.map(self._fit_single, promising), key=lambda f: f.misfit)
         if singles:
             gain = max(self.coarse.nominal_fit.misfit - singles[0].misfit, 0.0)
@@ -238,7 +255,7 @@ class HypothesisSearch:
     def _fit_regulars(self) -> None:
         """Fit the regular effects together, and subsets of them."""
         price = self.posterior.prices.ordinary
-        chosen = choose_regulars(self.effects, self.screened, price)
+        chosen = choose_regulars(self._searched, self.screened, price)
         if len(chosen) > 1:
             whole, reduced = fit_together(self.coarse, chosen, 2.0 * price, self.threads)
             self._keep([whole, *self._refine(reduced)])
@@ -309,7 +326,7 @@ class HypothesisSearch:
         self._extended.add(frozenset(leader.effects))
         price = 2.0 * self.posterior.prices.ordinary
         proposals = choose_distinct(
-            propose_additions(self.coarse, leader, self.effects, price, self.threads),
+            propose_additions(self.coarse, leader, self._searched, price, self.threads),
             self.thresholds.additions,
         )
         fits = self.threads.map(
@@ -319,8 +336,8 @@ class HypothesisSearch:
         if self.posterior.has_unexplained_residual:
             fits += self._refine(
                 [
-                    *start_in_series(self.coarse, leader, self.effects, self.pool.keys()),
-                    *start_unfolded(self.coarse, leader, self.effects),
+                    *start_in_series(self.coarse, leader, self._searched, self.pool.keys()),
+                    *start_unfolded(self.coarse, leader, self._searched),
                 ]
             )
         self._keep(fits)
@@ -328,10 +345,10 @@ class HypothesisSearch:
     def _vary(self, leader: Fit, count: int) -> None:
         """Fit a hypothesis without each effect, and with each replaced by `count` others."""
         starts = self._leave_out(leader)
-        starts += propose_replacements(self.coarse, leader, self.effects, count, self.threads)
-        starts += start_regular_instead(self.coarse, leader, self.effects)
+        starts += propose_replacements(self.coarse, leader, self._searched, count, self.threads)
+        starts += start_regular_instead(self.coarse, leader, self._searched)
         starts += start_merged(leader)
-        starts += start_rescaled(self.coarse.plant, leader, self.effects)
+        starts += start_rescaled(self.coarse.plant, leader, self._searched)
         self._keep(self._refine(starts))
 
     def _leave_out(self, fit: Fit) -> list[Start]:
@@ -357,7 +374,7 @@ class HypothesisSearch:
     def _vary_best(self) -> None:
         """Look for rivals of the best hypothesis, until it stays the best."""
         best_fit = self.posterior.best.fit
-        self._keep(self._refine(start_unfolded(self.coarse, best_fit, self.effects)))
+        self._keep(self._refine(start_unfolded(self.coarse, best_fit, self._searched)))
         # The same hypothesis may win again after another one was the best, so the loop needs a
         # memory to end.
         varied: set[frozenset[Effect]] = set()
@@ -409,7 +426,7 @@ class HypothesisSearch:
         restarts = self.threads.spread(lambda fit: start_otherwise(coarse, fit), leaders)
         starts = [start for restart in restarts for start in restart]
         for fit in leaders[:1]:
-            starts += start_elsewhere(coarse, fit, self.effects, known)
+            starts += start_elsewhere(coarse, fit, self._searched, known)
         self._keep(self._refine(starts))
         for fit in self._choose_beginnings():
             self._extend(fit)
