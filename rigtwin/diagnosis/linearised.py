@@ -67,7 +67,20 @@ class Linearised:
             Misfit, remaining effects and their values, the least misfit first. Sets in which an
             effect lacks the dry friction that it acts through are omitted.
         """
-        return self._leave_out(range(len(self._fit.effects)))
+        reduced = [self._as_they_are(each) for each in self._leave_out(range(len(self._sizes)))]
+        return sorted(reduced, key=lambda result: result[0])
+
+    def _as_they_are(self, reduced: Reduced) -> Reduced:
+        """Return the remaining effects at their present values if that fits better.
+
+        The way back to nominal is long for a limit that is hardly reached, and not linear.
+        """
+        misfit, effects, _ = reduced
+        known = dict(zip(self._fit.effects, self._fit.values, strict=True))
+        values = tuple(known[effect] for effect in effects)
+        plant = with_values(self._fitter.plant, effects, values)
+        simulated = self._fitter.space.misfit(self._fitter.evidence.residual(plant))
+        return (simulated, effects, values) if simulated < misfit else reduced
 
     def eliminate(self) -> list[Reduced]:
         """Leave out one effect after another, always the one whose loss raises the misfit least.

@@ -13,7 +13,7 @@ allow it. It is scored on the same ticks with all integration steps.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
 
 from rigtwin.components import Effect
@@ -168,8 +168,7 @@ class HypothesisSearch:
                 if self._improved(before) or len(before.fit.effects) <= SHORT:
                     self._climb()
             if self._later and self.posterior.has_unexplained_residual:
-                self._searched = tuple(self.effects)
-                self._extended.clear()
+                self._widen()
                 self._climb()
             if self.posterior.has_unexplained_residual:
                 self._reduce_closest()
@@ -186,14 +185,7 @@ class HypothesisSearch:
         # Prices are in nats; a chi-square is twice as large.
         price = 2.0 * self.posterior.prices.ordinary
         self.on_first_look(look_first(self.coarse, self.screened, price, self.thresholds))
-        most = max((screened.promise for screened in self.screened), default=0.0)
-        least = self.thresholds.promising_share * max(most, price)
-        promising = [
-            screened
-            for screened in self.screened
-            if screened.promise >= least and screened.effect in self._searched
-        ]
-        singles = sorted(self.threads.map(self._fit_single, promising), key=lambda f: f.misfit)
+        singles = self._fit_promising(self._searched)
         if singles:
             gain = max(self.coarse.nominal_fit.misfit - singles[0].misfit, 0.0)
             most = singles[0].misfit + self.thresholds.precise_fit_shortfall * gain + 2.0 * price
@@ -203,6 +195,20 @@ class HypothesisSearch:
             self._settle(settled)
             self._add([fit for fit in singles[: 2 * SETTLED] if fit not in settled])
         return singles
+
+    def _widen(self) -> None:
+        """Search for all effects from now on, and fit those alone that were left for later."""
+        self._searched = tuple(self.effects)
+        self._extended.clear()
+        self._keep(self._fit_promising(self._later))
+
+    def _fit_promising(self, effects: Collection[Effect]) -> list[Fit]:
+        """Fit each of several effects alone that may be worth its price, the best fit first."""
+        most = max((screened.promise for screened in self.screened), default=0.0)
+        price = 2.0 * self.posterior.prices.ordinary
+        least = self.thresholds.promising_share * max(most, price)
+        promising = [s for s in self.screened if s.promise >= least and s.effect in effects]
+        return sorted(self.threads.map(self._fit_single, promising), key=lambda f: f.misfit)
 
     def _fit_single(self, screened: Screened) -> Fit:
         """Fit an effect alone; for a free joint also from the balance of forces."""

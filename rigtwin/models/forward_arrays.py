@@ -74,6 +74,7 @@ class WorkSpace(NamedTuple):
     midspeed: Array  # Velocities extrapolated to the step, m/s, shape (coordinates,).
     ahead_speed: Array  # Velocities after the step, m/s, shape (coordinates,).
     pushed: Array  # Actuators' forces over the step, N, shape (coordinates,).
+    transmitted: Array  # The same with the servos' whole damping, N, shape (coordinates,).
     earlier_push: Array  # Actuators' forces up to the step, N, shape (coordinates,).
     system: Array  # Matrix of the free coordinates' equation, then its Cholesky factor, kg.
     right: Array  # Right side, Ns, then the free velocities without dry friction, m/s.
@@ -115,6 +116,7 @@ def allocate(size: int, loose: int, guides: int, servos: int) -> WorkSpace:
         midspeed=np.zeros(size),
         ahead_speed=np.zeros(size),
         pushed=np.zeros(size),
+        transmitted=np.zeros(size),
         earlier_push=np.zeros(size),
         system=np.zeros((loose, loose)),
         right=np.zeros(loose),

@@ -69,6 +69,7 @@ def push_coordinates(inputs: StepInputs, number: int, work: WorkSpace) -> None:
         now = 0.5 * (earlier + inputs.pushes[a, number])
         for i in range(len(work.pushed)):
             work.pushed[i] += inputs.levers[a, i] * now
+            work.transmitted[i] += inputs.levers[a, i] * now
             work.earlier_push[i] += inputs.levers[a, i] * earlier
 
 
@@ -98,8 +99,10 @@ def serve(servos: Servos, state: State, number: int, h: float, work: WorkSpace) 
         force -= (1.0 - weight) * held_by * rate_now
         work.held_by[a], work.weights[a] = held_by, weight
         before = push(law, earlier, position_at, rate_mid)
+        whole = force - weight * held_by * rate_now
         for i in range(size):
             work.pushed[i] += servos.levers[a, i] * force
+            work.transmitted[i] += servos.levers[a, i] * whole
             work.earlier_push[i] += servos.levers[a, i] * before
 
 
@@ -136,7 +139,7 @@ def resist_explicitly(
             along = contacts.along[g, i]
             place += along * state.place[i]
             rate += along * state.speed[i]
-            load += along * work.pushed[i]
+            load += along * work.transmitted[i]
             along_squared += along * along
         work.place[g], work.rate[g] = place, rate
         # Force per unit of the guide's own coordinate, for load-dependent friction.
@@ -322,7 +325,7 @@ def advance(
             # are second order in h.
             for i in range(size):
                 work.midspeed[i] = state.speed[i] + 0.5 * (state.speed[i] - state.before[i])
-                work.pushed[i] = work.earlier_push[i] = 0.0
+                work.pushed[i] = work.transmitted[i] = work.earlier_push[i] = 0.0
             # M(q) and c(q, q'), by MuJoCo where they change with the state.
             find_terms(bodies, state.place, work.midspeed, work.inertia, work.bias)
             push_coordinates(inputs, number, work)

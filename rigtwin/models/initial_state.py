@@ -190,7 +190,7 @@ class InitialState:
         noises = [each.noise for each, _ in rows.values()]
         held = np.array(
             [
-                max(form * float(np.std(each.measured)), noise, 1e-300)
+                max(form * float(np.std(each.measured)), noise, 1e-100)
                 for (each, form), noise in zip(rows.values(), noises, strict=True)
             ]
         )
@@ -361,7 +361,8 @@ class InitialState:
             if np.all(rms <= CLOSE * judged.held):
                 break
             residual = predict(state).reshape(judged.measured.shape) - judged.measured
-            share = float(np.max(np.sqrt(np.mean(residual**2, axis=1)) / rms))
+            after = np.sqrt(np.mean(residual**2, axis=1))
+            share = float(np.max(after / np.maximum(rms, judged.held)))
             # Only a residual that falls much is one of the state, whose derivatives were too rough.
             if share > FALLS:
                 break

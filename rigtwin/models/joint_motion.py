@@ -241,7 +241,7 @@ def integrate_pushed(
                 )
                 continue
             if yields:
-                behind, held_back = give_way(guide_step, behind, pushed, x)
+                behind, held_back = give_way(guide_step, behind, pushed - held_by * v, x)
                 # The mount decouples the guide, whose force is therefore explicit; only a servo's
                 # damping is implicit.
                 v = (v + h * (outer - held_back) / mass) / (1.0 + h * held_by / mass)

@@ -66,7 +66,7 @@ def step_joint(
     ahead = 1.0 - mass / damped if damped > 2.0 * mass else 0.5
     total = mass + ahead * damped
     rhs = (mass - (1.0 - ahead) * damped) * v + h * load
-    forward, backward = dry_limits(guide_step.dry_friction, v, pushed)
+    forward, backward = dry_limits(guide_step.dry_friction, v, pushed - held_by * v)
     # Without dry friction; then with a stretched spring; then with a slider that slides.
     velocity = rhs / total
     stretch_length = x + h * velocity - slider
@@ -140,7 +140,8 @@ def step_behind_play(
     heavy = turning + h * held_by
     freely = (turning * rotor[1] + h * pushed) / heavy
     rubbing = h * play.rotor_friction / heavy
-    moved = _carry(guide_step, carried, state, pushed, outer)
+    driven = pushed - held_by * rotor[1]
+    moved = _carry(guide_step, carried, state, driven, outer)
     speed, contact = _shrink(freely, rubbing), 0.0
     distance = rotor[0] + h * speed - moved[0]
     if abs(distance) > play.half:
@@ -156,6 +157,6 @@ def step_behind_play(
             excess = beyond + relaxed * (beyond - before) - soft * contact
             contact = max(contact + excess / (soft + (1.0 + relaxed) * yielding), 0.0)
             speed = _shrink(freely - h * side * contact / heavy, rubbing)
-            moved = _carry(guide_step, carried, state, pushed, outer + side * contact)
+            moved = _carry(guide_step, carried, state, driven, outer + side * contact)
             distance = rotor[0] + h * speed - moved[0]
     return (rotor[0] + h * speed, speed), moved

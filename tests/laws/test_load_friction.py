@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rigtwin.components import Guide
+from rigtwin.components import Guide, Servo
 from rigtwin.components.guide_step import guide_step_of
 from rigtwin.description.document import load
 from rigtwin.models.joint_inverse import resist_at_once
@@ -91,6 +91,41 @@ def test_coupled_joints_count_their_actuators_force(tmp_path: Path):
     acceleration = (40.0 - 2.0 * 6.0 - COULOMB - MU * 40.0) / 2.0
     np.testing.assert_allclose(found[1], 0.5 * acceleration * TIME**2, atol=5e-3 * found[1, -1])
     np.testing.assert_allclose(found[0], 0.0, atol=1e-9)
+
+
+GAIN, DAMPING, SPEED = 400.0, 30.0, 0.2
+DRAGGED = (COULOMB / (1.0 - MU) + DAMPING * SPEED) / GAIN
+"""Distance by which a joint lags behind its servo's command at a steady speed v, m, from
+F = k e − d v and F = F_c + μ |F|."""
+
+
+@law_of("load_friction", Guide)
+def test_a_pushed_joint_counts_the_whole_force_of_its_servo():
+    servo = Servo(position_gain=GAIN, damping_gain=DAMPING)
+    command = SPEED * PERIOD * np.arange(3000)
+    position = motion_under(GUIDE, command, MASS, servo, start=(0.0, SPEED))[0]
+    assert command[-1] - position[-1] == pytest.approx(DRAGGED, rel=1e-3)
+
+
+@law_of("load_friction", Guide)
+@pytest.mark.skipif(INTERPRETED, reason="coupled joints call MuJoCo from compiled code")
+def test_coupled_joints_count_the_whole_force_of_their_servo(tmp_path: Path):
+    actuator = f'<position name="push" joint="one" kp="{GAIN}" kv="{DAMPING}"/>'
+    model = MJCF.replace('<motor name="push" joint="two"/>', actuator)
+    (tmp_path / "two.xml").write_text(model.replace('gravity="0 0 -6"', 'gravity="0 0 0"'))
+    (tmp_path / "two.toml").write_text(TOML.replace('"push",', '"push", type = "servo",'))
+    machine = load(tmp_path / "two.toml")
+    still, command = np.zeros(3000), SPEED * PERIOD * np.arange(3000)
+    time = PERIOD * np.arange(3000)
+    columns = {"/command": {"push": command}, "/sensor": {"x_one": command, "x_two": still}}
+    recording = Recording(Path("two"), "two", "", PERIOD, time, columns, {})
+    plant = machine.plant._replace(one=GUIDE)
+    model = machine.physics.model(
+        machine, recording.inputs, machine.configuration._replace(plant=plant), 2
+    )
+    lag = command[-1] - model.predict(plant)[0, -1]
+    # A command that is held from tick to tick is late by half a tick on average.
+    assert lag == pytest.approx(DRAGGED + 0.5 * PERIOD * SPEED, rel=1e-3)
 
 
 def test_both_loads_differ_by_the_friction_itself():
