@@ -32,8 +32,14 @@ SCALED = (
 BOTH = "gains"
 """Kind that multiplies the position and the damping gain of its servo."""
 GAINS = ("position_gain", "damping_gain")
-NEAR = 0.02
-"""Relative distance from nominal within which a scaled coefficient counts as nominal."""
+BASIC = ("mass", *GAINS)
+"""Kinds whose nominal value is scaled too where the hypothesis leaves it nominal. Nominal friction
+is small enough to be left as it is."""
+NEAR = 0.05
+"""Relative distance within which two coefficients count as equal."""
+LONGER = 1
+"""Number of effects by which a scaled hypothesis may exceed its leader. What is nearly nominal is
+left out of it later."""
 
 
 def start_rescaled(plant: Plant, leader: Fit, candidates: Sequence[Effect]) -> list[Start]:
@@ -65,17 +71,36 @@ def start_rescaled(plant: Plant, leader: Fit, candidates: Sequence[Effect]) -> l
     pivots = [nominal[effect] / value for effect, value in fitted.items() if value != 0.0]
     starts: list[Start] = []
     for factor in (1.0, *(pivot for pivot in pivots if pivot > 0.0)):
-        scaled = {effect: factor * fitted.get(effect, value) for effect, value in nominal.items()}
-        changed = [
-            (effect, (value,))
-            for effect, value in scaled.items()
-            if abs(value - nominal[effect]) > NEAR * abs(value)
-        ]
-        pairs = [*others, *changed]
+        scaled = {effect: factor * value for effect, value in fitted.items()}
+        for effect, value in nominal.items():
+            if effect.kind.name in BASIC:
+                scaled.setdefault(effect, factor * value)
+        changed = {e: v for e, v in scaled.items() if not _equal(v, nominal[e])}
+        pairs = [*others, *_join_gains(changed, nominal, candidates)]
         effects = tuple(effect for effect, _ in pairs)
-        if 0 < len(pairs) < len(leader.effects) and _is_consistent(effects, plant):
+        if frozenset(effects) == frozenset(leader.effects):
+            continue
+        if 0 < len(pairs) <= len(leader.effects) + LONGER and _is_consistent(effects, plant):
             starts.append((effects, tuple(values for _, values in pairs)))
     return starts
+
+
+def _equal(value: float, other: float) -> bool:
+    return abs(value - other) <= NEAR * max(abs(value), abs(other))
+
+
+def _join_gains(
+    changed: Mapping[Effect, float], nominal: Mapping[Effect, float], candidates: Sequence[Effect]
+) -> list[tuple[Effect, tuple[float, ...]]]:
+    """Return effects and values, with one factor for both gains of a servo that have the same."""
+    pairs = {effect: (value,) for effect, value in changed.items()}
+    for both in (effect for effect in candidates if effect.kind.name == BOTH):
+        gains = [e for e in changed if e.group == both.group and e.kind.name in GAINS]
+        ratios = [changed[effect] / nominal[effect] for effect in gains if nominal[effect] > 0.0]
+        if len(ratios) == len(GAINS) and _equal(ratios[0], ratios[1]):
+            pairs = {effect: value for effect, value in pairs.items() if effect not in gains}
+            pairs[both] = (ratios[0],)
+    return list(pairs.items())
 
 
 def _magnitude(effect: Effect, plant: Plant) -> float:
