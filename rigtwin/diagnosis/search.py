@@ -185,6 +185,10 @@ class HypothesisSearch:
         # Prices are in nats; a chi-square is twice as large.
         price = 2.0 * self.posterior.prices.ordinary
         self.on_first_look(look_first(self.coarse, self.screened, price, self.thresholds))
+        # The best suspect of all is not left for later.
+        suspect = max(self.screened, key=lambda screened: screened.promise, default=None)
+        if suspect is not None and suspect.effect in self._later:
+            self._searched = (*self._searched, suspect.effect)
         singles = self._fit_promising(self._searched)
         if singles:
             gain = max(self.coarse.nominal_fit.misfit - singles[0].misfit, 0.0)
