@@ -15,9 +15,7 @@ from itertools import pairwise
 import mujoco
 import numpy as np
 
-from rigtwin.components import (
-    Guide,
-)
+from rigtwin.components import Guide
 from rigtwin.components.plant import Plant, select
 from rigtwin.components.sensors import apply_sensor, sensor_of
 from rigtwin.description.configuration import Configuration
@@ -25,11 +23,11 @@ from rigtwin.description.machine import Machine, ReplayOf, Row
 from rigtwin.models.forward_arrays import GuideContacts, State, allocate
 from rigtwin.models.forward_motion import advance
 from rigtwin.models.initial_state import InitialState, Seen
-from rigtwin.models.joint_drives import Drives, recorded
-from rigtwin.models.joint_layout import Layout
+from rigtwin.models.joint_drives import JointDrives, recorded
+from rigtwin.models.joint_layout import JointLayout
 from rigtwin.models.joint_simulation import KEPT, LIGHTEST
 from rigtwin.models.multibody import Multibody, inertia_at
-from rigtwin.models.windows import Sense, Starts, Window, divide
+from rigtwin.models.windows import Sense, Window, WindowStarts, divide
 from rigtwin.numerics.arrays import Array, clip_diverged
 from rigtwin.numerics.memo import Memo
 from rigtwin.recording import Inputs
@@ -78,14 +76,14 @@ class CoupledJoints:
         self._configuration, self._steps = configuration, steps
         self._period, self._ticks = inputs.period, inputs.ticks
         self.rows: tuple[Row, ...] = replay.rows
-        self._layout = Layout(machine, replay)
+        self._layout = JointLayout(machine, replay)
         self._loose = len(replay.free)
         self._read_motions(inputs)
         loosest = self._find_loosest()
-        self._drives = Drives(machine, self._layout, inputs, self._read, loosest, steps)
+        self._drives = JointDrives(machine, self._layout, inputs, self._read, loosest, steps)
         self._last: Memo[Array] = Memo(KEPT)
         windows = self._divide(cuts) if windows is None else tuple(windows)
-        self._starts = Starts(windows, quick, KEPT)
+        self._starts = WindowStarts(windows, quick, KEPT)
 
     def _read_motions(self, inputs: Inputs) -> None:
         """Smooth the prescribed motions and collect the sensors that show the initial state."""

@@ -21,7 +21,7 @@ from rigtwin.components.servo import Push, push_law, pusher_of
 from rigtwin.description.machine import Machine
 from rigtwin.models.following import follow_command
 from rigtwin.models.forward_arrays import GuideContacts, Servos, StepInputs
-from rigtwin.models.joint_layout import Layout
+from rigtwin.models.joint_layout import JointLayout
 from rigtwin.models.joint_motion import RIGID
 from rigtwin.models.measured_motion import ELASTIC, recover_motion
 from rigtwin.numerics.arrays import Array, interpolate
@@ -35,7 +35,7 @@ def recorded(machine: Machine, signals: Inputs, name: str) -> Array:
     return signals.column(*channel)
 
 
-class Drives:
+class JointDrives:
     """What drives coupled joints in one recording, as compiled code takes it.
 
     Parameters
@@ -55,7 +55,7 @@ class Drives:
     def __init__(
         self,
         machine: Machine,
-        layout: Layout,
+        layout: JointLayout,
         signals: Inputs,
         motions: Mapping[str, tuple[Array, float]],
         loosest: Array,

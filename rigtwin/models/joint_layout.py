@@ -16,7 +16,7 @@ from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.memo import Memo
 
 
-class Layout:
+class JointLayout:
     """Components of a machine in the coordinates of its coupled joints.
 
     Parameters

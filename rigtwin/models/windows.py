@@ -82,7 +82,7 @@ def divide(
     return tuple(part for half in halves for part in divide(*half, period, judge))
 
 
-class Starts:
+class WindowStarts:
     """Initial states from which the windows of a recording are predicted.
 
     Parameters
