@@ -91,6 +91,21 @@ def test_the_longest_name_of_a_joint_decides(tmp_path: Path, motion: Columns):
     assert sources(answer)["elbow.position"] == "elbow_pos"
 
 
+@pytest.mark.parametrize(("prefix", "suffix"), [("robot0_", "_joint"), ("FL_", "_joint")])
+def test_words_that_all_joints_share_need_not_be_in_the_log(
+    tmp_path: Path, motion: Columns, prefix: str, suffix: str
+):
+    model = write_arm(tmp_path)
+    text = model.read_text()
+    for joint in NOMINAL:
+        text = text.replace(f'"{joint}"', f'"{prefix}{joint}{suffix}"')
+    model.write_text(text)
+    columns = renamed(motion, dict(zip(PLAIN, NAMINGS["by joint"], strict=True)))
+    answer = rigtwin.describe(model, write_log(tmp_path / "log.csv", columns))
+    assert sources(answer)[f"{prefix}elbow{suffix}.position"] == "elbow.pos"
+    assert sources(answer)[f"{prefix}shoulder{suffix}.force"] == "shoulder.torque"
+
+
 DEGREES: dict[str, Callable[[Columns], dict[str, Array]]] = {
     "in brackets": lambda c: _degrees(c, "q1 [deg]", "q2 [deg]"),
     "in the name": lambda c: _degrees(c, "shoulder_deg", "elbow_deg"),

@@ -43,8 +43,9 @@ class Alias:
 def list_aliases(mechanism: Mechanism) -> list[Alias]:
     """Return all names that identify a hinge or slide of a model.
 
-    Each name comes in two forms: complete, and without words that do not tell joints apart, such as
-    joint, servo, encoder or position.
+    Each name comes in several forms: complete, without words that do not tell joints apart, such as
+    joint, servo, encoder or position, and without those that all joints share, such as the name of
+    the robot.
 
     Parameters
     ----------
@@ -59,17 +60,24 @@ def list_aliases(mechanism: Mechanism) -> list[Alias]:
         quantity = MEASURES.get(mechanism.measures(sensor))
         if quantity is not None:
             named.append((mechanism.joint_of("sensor", sensor), sensor, quantity))
+    shared = frozenset[str]()
+    if len(joints) > 1:
+        shared = frozenset.intersection(*(frozenset(split_words(joint)) for joint in joints))
     aliases: dict[tuple[str, tuple[str, ...]], Alias] = {}
     for joint, name, quantity in named:
         if joint not in joints:
             continue
         words = split_words(name)
         telling = tuple(word for word in words if word not in QUANTITY_WORDS | MEASURED | COMMANDED)
-        # A number alone does not identify a joint: it would match any numbered column.
-        short = telling if any(not word.isdigit() for word in telling) else ()
-        for form in (words, short):
+        plain = tuple(word for word in telling if word not in shared)
+        for form in (words, _identifying(telling), _identifying(plain)):
             if form:
                 # The joint's own name comes first in the list, so an equal name of its sensor adds
                 # nothing.
                 aliases.setdefault((joint, form), Alias(joint, form, quantity, name))
     return list(aliases.values())
+
+
+def _identifying(words: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the words, or none if they are numbers alone, which match any numbered column."""
+    return words if any(not word.isdigit() for word in words) else ()
