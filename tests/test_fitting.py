@@ -11,6 +11,8 @@ import pytest
 
 import rigtwin
 from rigtwin.cli import main
+from rigtwin.diagnosis.fitter import Fitter
+from rigtwin.diagnosis.scoring import Scorer
 
 HIDDEN = {"coulomb@elbow": 0.6, "viscous@elbow": 0.45}
 
@@ -118,3 +120,15 @@ def test_the_command_prints_and_writes_the_values(recordings, tmp_path: Path, ca
     assert "coulomb@elbow" in capsys.readouterr().out
     (parameter,) = json.loads(out.read_text())["parameters"]
     assert parameter["unit"] == "Nm"
+
+
+def test_intervals_are_no_narrower_than_the_scatter_over_blocks_of_time():
+    # A stiffness that is not fitted leaves a residual whose neighbouring samples are correlated.
+    arm = rigtwin.machine("planar-arm")
+    test = next(iter(rigtwin.experiments(arm)))
+    recording = rigtwin.run(arm, test, seed=2, effects={**HIDDEN, "stiffness@elbow": 2.0})
+    fitted = rigtwin.fit(recording, list(HIDDEN))
+    fitter = Fitter(fitted.evidence)
+    widths = Scorer(fitter).score(fitter.refine(fitted.effects, fitted.values)).widths
+    deviations = np.sqrt(np.diag(fitted.covariance))
+    assert np.all(deviations >= 0.99 * np.concatenate(widths))

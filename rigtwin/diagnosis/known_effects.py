@@ -18,6 +18,7 @@ from rigtwin.diagnosis.fit import Fit, clashes, is_possible, with_values
 from rigtwin.diagnosis.fitter import PERTURBATIONS, Fitter
 from rigtwin.diagnosis.gauss_newton import SUFFICIENT_MISFIT, take_derivatives
 from rigtwin.diagnosis.minima import leave_minimum
+from rigtwin.diagnosis.scoring import Scorer
 from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
 
@@ -262,7 +263,8 @@ def _find_covariance(fitter: Fitter, fit: Fit) -> Array:
     """Return the covariance of the values: the inverse normal matrix with all tolerances free.
 
     Where the model leaves more than the expected noise, the rest counts as noise: the covariance
-    grows by χ² over its expected value.
+    grows by χ² over its expected value. Where neighbouring samples of the rest are correlated, it
+    grows to the scatter over blocks of time (`Scored.widths`), and the correlations stay.
     """
     evidence = fitter.evidence
     base = fit.base if fit.base is not None else evidence.plant
@@ -279,7 +281,11 @@ def _find_covariance(fitter: Fitter, fit: Fit) -> Array:
     jacobian = take_derivatives(residual, optimum, rest, steps, high)
     normal, _ = fitter.space.without_replaced(fit.effects).normal_equations(jacobian, rest)
     excess = max(fit.misfit / evidence.expected, 1.0)
-    return _invert(normal, steps, high - low) * excess
+    covariance = _invert(normal, steps, high - low) * excess
+    formal = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+    widths = np.concatenate(Scorer(fitter).score(fit).widths)
+    growth = np.maximum(np.minimum(widths, high - low) / formal, 1.0)
+    return np.asarray(covariance * np.outer(growth, growth))
 
 
 def _invert(normal: Array, steps: Array, ranges: Array) -> Array:
