@@ -101,7 +101,8 @@ class Physics(ABC):
         Types of component and kinds of effect that the model does not have.
     compounds : bool
         Whether motions of several joints integrate the effects, so that one effect may resemble
-        several others together. The search then begins with the regular effects.
+        several others together. The search then begins with the regular effects, and ends with
+        the rare ones.
     has_contacts : bool
         Whether the model has the contacts of the MJCF.
     longest_delay : float

@@ -71,8 +71,8 @@ FEW = 3
 SHORT = 4
 """Number of effects up to which the variants of every leader are fitted."""
 LATER = (*RARE, "deadband", "stribeck")
-"""Kinds that are searched at several free joints only where the others leave a large residual. They
-refine dry friction, or resemble what it leaves."""
+"""Kinds that are searched only where the others leave a large residual, in machines whose effects
+compound. They refine dry friction, or resemble what it leaves."""
 STEADY_ROUNDS = 2
 """Rounds without a better hypothesis after which the search ends."""
 
@@ -112,9 +112,8 @@ class HypothesisSearch:
     pool: dict[frozenset[Effect], Scored] = field(default_factory=dict, init=False)
 
     def __post_init__(self) -> None:
-        replays = self.evidence.machine.replays
-        # Where several joints move freely, every effect costs integrations of all of them.
-        staged = any(len(replay.free) > 1 for replay in replays)
+        # Where effects compound, every effect costs integrations of all joints.
+        staged = self.evidence.machine.physics.compounds
         self._later = tuple(e for e in self.effects if staged and e.kind.name in LATER)
         self._searched = tuple(e for e in self.effects if e not in self._later)
         searched = self.evidence.thin()

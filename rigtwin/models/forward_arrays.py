@@ -74,7 +74,7 @@ class WorkSpace(NamedTuple):
     midspeed: Array  # Velocities extrapolated to the step, m/s, shape (coordinates,).
     ahead_speed: Array  # Velocities after the step, m/s, shape (coordinates,).
     pushed: Array  # Actuators' forces over the step, N, shape (coordinates,).
-    transmitted: Array  # The same with the servos' whole damping, N, shape (coordinates,).
+    transmitted: Array  # Actuators' forces with all damping, N, shape (coordinates,).
     earlier_push: Array  # Actuators' forces up to the step, N, shape (coordinates,).
     system: Array  # Matrix of the free coordinates' equation, then its Cholesky factor, kg.
     right: Array  # Right side, Ns, then the free velocities without dry friction, m/s.

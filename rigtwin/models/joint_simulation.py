@@ -35,7 +35,7 @@ from rigtwin.signals.noise import smooth
 KEPT = 24
 """Number of motions that are remembered."""
 CONTACT_STEPS = 4
-"""Factor on the integration steps of a joint with play, whose teeth hit each other in a few ms."""
+"""Factor on the integration steps of a joint with play: the impact of two teeth takes a few ms."""
 LIGHTEST = 1e-12
 """Smallest inertia of a joint, kg or kg m². Below it, a finite force has no finite acceleration."""
 

@@ -2,7 +2,7 @@
 
 Between motor and joint there may be a play. The motor's rotor and the joint then are two masses
 whose distance, rotor minus joint, is free within ± half the play. Beyond it, by a length b, the
-gear is a spring and damper that can only push [Nordin, Gutman, Automatica 38(10), 2002, section 3]:
+gear is a spring and damper that can only push [Nordin, Gutman, Automatica 38 (2002) 1633]:
 
     λ = max(b/s + c·db/dt, 0),  c = 2·ζ·√(m/s),  1/m = 1/rotor + 1/joint
 
