@@ -181,12 +181,12 @@ def propose_replacements(
         without = fitter.evidence.residual(with_values(fitter.plant, remaining, values))
         targets = (without - residual, _local_response(fitter, fit, number, residual))
 
-        def resemble(
+        def resemble_either(
             candidate: Effect, targets: tuple[Array, ...] = targets
         ) -> tuple[float, Effect, tuple[float, ...]]:
             # The difference of the two targets is the size of the change: an effect may be imitated
             # as a whole, or only in small changes about its fitted value.
-            whole, local = (_resemble(fitter, fit, candidate, target) for target in targets)
+            whole, local = (resemble(fitter, fit, candidate, target) for target in targets)
             return whole if whole[0] >= local[0] else local
 
         possible = [
@@ -196,7 +196,7 @@ def propose_replacements(
         ]
         compatible = [item for item in possible if not clashes(item, fit.effects)]
         # `sorted` is stable, so that candidates that resemble alike keep their order.
-        scored = sorted(threads.spread(resemble, compatible), key=lambda item: -item[0])
+        scored = sorted(threads.spread(resemble_either, compatible), key=lambda item: -item[0])
         starts += _choose_replacements(fit, number, scored, count)
         # A candidate that sets a parameter of the replaced effect has no response beside it, so
         # that it is tried unseen.
@@ -230,12 +230,27 @@ def _local_response(fitter: Fitter, fit: Fit, number: int, residual: Array) -> A
     return (moved - residual) / SMALL_PART
 
 
-def _resemble(
+def resemble(
     fitter: Fitter, fit: Fit, candidate: Effect, response: Array
 ) -> tuple[float, Effect, tuple[float, ...]]:
     """Return how well a candidate's response explains another response, and a start for it.
 
-    The measure is the squared cosine of the angle between both, 0 where they oppose each other.
+    Parameters
+    ----------
+    fitter
+        Fitter of the evidence.
+    fit
+        Fit beside which the candidate acts.
+    candidate
+        Screened effect.
+    response
+        Whitened response that the candidate may explain, shape (size,).
+
+    Returns
+    -------
+    tuple
+        Squared cosine of the angle between both responses, 0 where they oppose each other; the
+        candidate; and the values that explain most.
     """
     starts, responses = zip(*fitter.responses_beside(candidate, fit), strict=True)
     # An effect that replaces a tolerance must not be judged beside that tolerance.
@@ -270,7 +285,7 @@ def _choose_replacements(
         kinds = {candidate.kind.name, effect.kind.name}
         resembles = rank < count and cosine > RESEMBLES
         elsewhere = rank < ELSEWHERE and candidate.kind.name == effect.kind.name
-        late = candidate.group == effect.group and kinds <= {*LATE}
+        late = kinds <= {*LATE} and (candidate.group == effect.group or rank < ELSEWHERE)
         if resembles or elsewhere or late:
             starts.append(_replace_effect(fit, number, candidate, start))
         if kinds <= {*LATE_BY_TIME} and (late or elsewhere):

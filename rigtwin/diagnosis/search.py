@@ -24,6 +24,7 @@ from rigtwin.diagnosis.first_look import FirstLook, look_first
 from rigtwin.diagnosis.fit import Fit
 from rigtwin.diagnosis.fitter import Fitter, Screened
 from rigtwin.diagnosis.linearised import Linearised
+from rigtwin.diagnosis.merging import start_merged, start_with_summed_delays
 from rigtwin.diagnosis.minima import leave_minimum
 from rigtwin.diagnosis.posterior import HypothesisPosterior
 from rigtwin.diagnosis.prices import RARE
@@ -37,7 +38,6 @@ from rigtwin.diagnosis.starts import (
     Start,
     start_elsewhere,
     start_in_series,
-    start_merged,
     start_otherwise,
     start_regular_instead,
     start_unfolded,
@@ -358,7 +358,7 @@ class HypothesisSearch:
         starts = self._leave_out(leader)
         starts += propose_replacements(self.coarse, leader, self._searched, count, self.threads)
         starts += start_regular_instead(self.coarse, leader, self._searched)
-        starts += start_merged(leader)
+        starts += start_with_summed_delays(leader)
         starts += start_rescaled(self.coarse.plant, leader, self._searched)
         self._keep(self._refine(starts))
 
@@ -394,10 +394,16 @@ class HypothesisSearch:
             varied.add(frozenset(best))
             reduced.add(best)
             self._vary(self.posterior.best.fit, COMPARED)
+            self._merge(self.posterior.best.fit)
             # An effect that took the place of another may make a third one superfluous.
             rivals = [fit for fit in self._ranked_fits()[:RIVALS] if fit.effects not in reduced]
             reduced.update(fit.effects for fit in rivals)
             self._keep(self._refine([start for fit in rivals for start in self._leave_out(fit)]))
+
+    def _merge(self, leader: Fit) -> None:
+        """Fit a hypothesis with one effect in the place of each two."""
+        starts = start_merged(self.coarse, leader, self._searched, self.threads)
+        self._keep(self._refine(starts))
 
     def _refine(self, starts: Sequence[Start]) -> list[Fit]:
         """Fit from the starts that were not fitted before."""

@@ -1,8 +1,8 @@
 """Starts of fits that a search would not reach by adding one effect after another.
 
 A start is a set of effects and their values. Each function of this module adds starts for one
-reason why the stepwise search fails: effects in series, effects of second order, two delays in one
-loop, rare effects, the same kind at another component, and several minima of the misfit.
+reason why the stepwise search fails: effects in series, effects of second order, rare effects, the
+same kind at another component, and several minima of the misfit.
 """
 
 from __future__ import annotations
@@ -134,34 +134,6 @@ def _start_pair(
     starts = [(*values, *start) for start in product(first, second)]
     # The combinations are only simulated. The best one is fitted by the search.
     return both, min(starts, key=lambda start: _misfit(fitter, both, start))
-
-
-def start_merged(leader: Fit) -> list[Start]:
-    """Start one lag or delay in the place of two.
-
-    In a closed loop only the sum of two delays is observable, so that either alone, with the sum of
-    both times, may explain the data.
-
-    Parameters
-    ----------
-    leader
-        Fit whose lags and delays are merged.
-
-    Returns
-    -------
-    list of pairs
-        Effects, and the values from which they are fitted.
-    """
-    starts = []
-    for effect, remaining, values in leave_one_out(leader):
-        if effect.kind.name not in LATE_BY_TIME:
-            continue
-        time = leader.values[leader.effects.index(effect)][0]
-        for number, member in enumerate(remaining):
-            if member.kind.name in LATE_BY_TIME:
-                both = ((values[number][0] + time),)
-                starts.append((remaining, (*values[:number], both, *values[number + 1 :])))
-    return starts
 
 
 def start_regular_instead(fitter: Fitter, leader: Fit, candidates: Sequence[Effect]) -> list[Start]:

@@ -1,0 +1,102 @@
+"""Starts with one effect in the place of two.
+
+A delay of all commands resembles viscous friction at every joint, and the mass of a link resembles
+friction and gravity at two. A search that began with such effects cannot replace them one by one:
+beside one of them, the effect that is present explains little.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import combinations
+
+from rigtwin.components import Effect
+from rigtwin.diagnosis.fit import Fit, clashes, is_possible, with_values
+from rigtwin.diagnosis.fitter import Fitter
+from rigtwin.diagnosis.proposals import RESEMBLES, resemble
+from rigtwin.diagnosis.starts import LATE_BY_TIME, Start
+from rigtwin.diagnosis.threads import Threads
+from rigtwin.numerics.arrays import Array
+
+SUBSTITUTES = 2
+"""Number of effects tried in the place of each two."""
+
+
+def start_merged(
+    fitter: Fitter, leader: Fit, candidates: Sequence[Effect], threads: Threads
+) -> list[Start]:
+    """Start a hypothesis with one effect in the place of each two.
+
+    Parameters
+    ----------
+    fitter
+        Fitter of the evidence.
+    leader
+        Fit whose effects are merged.
+    candidates
+        Candidate effects, all of them screened.
+    threads
+        Threads that simulate in parallel.
+
+    Returns
+    -------
+    list of pairs
+        Effects, and the values from which they are fitted.
+    """
+    starts: list[Start] = []
+    residual = fitter.residual_at(leader)
+    for pair in combinations(range(len(leader.effects)), 2):
+        kept = [number for number in range(len(leader.effects)) if number not in pair]
+        effects = tuple(leader.effects[number] for number in kept)
+        values = tuple(leader.values[number] for number in kept)
+        possible = [
+            candidate
+            for candidate in candidates
+            if candidate not in leader.effects
+            and is_possible((*effects, candidate), fitter.plant)
+            and not clashes(candidate, effects)
+        ]
+        without = fitter.evidence.residual(with_values(fitter.plant, effects, values))
+
+        def resembles(
+            candidate: Effect, response: Array = without - residual
+        ) -> tuple[float, Effect, tuple[float, ...]]:
+            return resemble(fitter, leader, candidate, response)
+
+        # `sorted` is stable, so that candidates that resemble alike keep their order.
+        ranked = sorted(threads.spread(resembles, possible), key=lambda item: -item[0])
+        starts += [
+            ((*effects, substitute), (*values, start))
+            for cosine, substitute, start in ranked[:SUBSTITUTES]
+            if cosine > RESEMBLES
+        ]
+    return starts
+
+
+def start_with_summed_delays(leader: Fit) -> list[Start]:
+    """Start one lag or delay in the place of two.
+
+    In a closed loop only the sum of two delays is observable, so that either alone, with the sum of
+    both times, may explain the data.
+
+    Parameters
+    ----------
+    leader
+        Fit whose lags and delays are merged.
+
+    Returns
+    -------
+    list of pairs
+        Effects, and the values from which they are fitted.
+    """
+    starts: list[Start] = []
+    late = [n for n, effect in enumerate(leader.effects) if effect.kind.name in LATE_BY_TIME]
+    for kept in late:
+        for removed in late:
+            if removed != kept:
+                values = list(leader.values)
+                values[kept] = (values[kept][0] + values[removed][0],)
+                effects = list(leader.effects)
+                del values[removed], effects[removed]
+                starts.append((tuple(effects), tuple(values)))
+    return starts
