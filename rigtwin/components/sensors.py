@@ -141,7 +141,7 @@ class TransducerState(NamedTuple):
     """State of a sensor; changed in place."""
 
     history: Array  # Past values, a ring buffer.
-    memory: Array  # Position in the ring (−1 before the first tick), lag's output, drift so far.
+    memory: Array  # Position in the ring (−1 at first), output and input of the lag, drift so far.
 
 
 def transducer(sensor: Sensor, period: float) -> Transducer:
@@ -157,7 +157,7 @@ def transducer(sensor: Sensor, period: float) -> Transducer:
 
 def start_transducer(sensor: Transducer) -> TransducerState:
     """Return the state of a sensor before its first sample."""
-    return TransducerState(ring(sensor.delay, 0.0), np.array([-1.0, 0.0, 0.0]))
+    return TransducerState(ring(sensor.delay, 0.0), np.array([-1.0, 0.0, 0.0, 0.0]))
 
 
 def remove_drift(sensor: Sensor, measured: Array, period: float) -> Array:
@@ -185,11 +185,15 @@ def transduce(sensor: Transducer, state: TransducerState, value: float) -> float
     # Before the first tick, the quantity is taken to have had its first value for long.
     if state.memory[0] < 0.0:
         state.history[:] = value
-        state.memory[0], state.memory[1] = 0.0, value
+        state.memory[0], state.memory[1], state.memory[2] = 0.0, value, value
     late = delay_sample(state.history, state.memory, sensor.delay, value)
-    state.memory[1] += sensor.share * (late - state.memory[1])
-    reading = sensor.gain * state.memory[1] + sensor.offset + state.memory[2]
-    state.memory[2] += sensor.drift
+    # A lag sees the mean of its input over the tick: with the latest value alone it would be half a
+    # tick short.
+    seen = late if sensor.share == 1.0 else 0.5 * (state.memory[2] + late)
+    state.memory[1] += sensor.share * (seen - state.memory[1])
+    state.memory[2] = late
+    reading = sensor.gain * state.memory[1] + sensor.offset + state.memory[3]
+    state.memory[3] += sensor.drift
     return reading
 
 

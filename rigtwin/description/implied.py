@@ -29,8 +29,20 @@ MOVERS = {POSITIONS: "position actuator", SERVOS: "servo", FORCES: "force actuat
 """Kind of test → type of the components that take its commands."""
 KEYS = ("test", "joints")
 """Keys of a replay whose components are implied."""
-PRESCRIBED = ["coulomb", "viscous", "offset", "asymmetry", "stribeck", "load_friction", "drag"]
+PRESCRIBED = [
+    "coulomb",
+    "viscous",
+    "offset",
+    "stiffness",
+    "asymmetry",
+    "stribeck",
+    "load_friction",
+    "drag",
+    "position_force",
+]
 """Effects at coupled joints with prescribed motion."""
+PRESCRIBED_FORCE = ["gain", "lag", "delay"]
+"""Effects of the measured forces at coupled joints with prescribed motion."""
 FREE = [
     "coulomb",
     "viscous",
@@ -227,7 +239,8 @@ def _add_group(
                 # Several joints: a short list keeps the number of explanations small enough to tell
                 # apart.
                 tables[identifier(joint)]["effects"] = PRESCRIBED
-                tables[name]["effects"] = ["gain"]
+                tables[name]["effects"] = PRESCRIBED_FORCE
+                _add_rotor(joint, tables)
             _add_tendons(mechanism, joints, tables)
             _add_links(mechanism, joints, tables)
         else:
@@ -276,6 +289,12 @@ def _add_tendons(
         along = [joint for joint, _ in mechanism.acts_on("tendon", tendon)]
         if along and set(along) <= set(joints):
             tables[identifier(tendon)] = {"tendon": tendon, "effects": ["coulomb", "viscous"]}
+
+
+def _add_rotor(joint: str, tables: dict[str, dict[str, Any]]) -> None:
+    """Add the rotor that turns with a joint: data sheets of robots seldom state its inertia."""
+    name = f"{identifier(joint)}_rotor"
+    tables[name] = {"joint": joint, "type": "rotor", "effects": ["armature"]}
 
 
 def _add_links(

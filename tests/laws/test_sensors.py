@@ -76,9 +76,22 @@ def test_a_sensor_without_drift_is_left_as_it_is():
 @pytest.mark.parametrize("kind", SENSORS)
 @pytest.mark.parametrize("lag", [0.004, 0.03])
 def test_a_lag_answers_a_jump_with_an_exponential(kind, lag):
-    since = np.maximum(TIME + PERIOD - 0.1, 0.0)
+    # The quantity rises linearly over the tick before 0.1 s, so the jump lies half a tick earlier.
+    since = np.maximum(TIME + 0.5 * PERIOD - 0.1, 0.0)
     expected = 1.0 - 0.8 * np.exp(-since / lag)
-    assert apply_sensor(kind(lag=lag), JUMP, PERIOD) == pytest.approx(expected, abs=1e-9)
+    tolerance = 0.8 * (PERIOD / lag) ** 2 / 8.0
+    read = apply_sensor(kind(lag=lag), JUMP, PERIOD)
+    assert read == pytest.approx(expected, abs=tolerance)
+
+
+@law_of("lag", *SENSORS)
+@pytest.mark.parametrize("kind", SENSORS)
+@pytest.mark.parametrize("lag", [0.0008, 0.004, 0.03])
+def test_a_lag_follows_a_ramp_by_its_time_constant(kind, lag):
+    read = apply_sensor(kind(lag=lag), RAMP, PERIOD)
+    behind = (RAMP - read)[-10:] / 2.0
+    # To second order in the tick: 1 / (1 − exp(−h/T)) − 1/2 ticks, which is T up to h²/12T.
+    assert behind == pytest.approx(lag, abs=1.1 * PERIOD**2 / (12.0 * lag))
 
 
 @law_of("delay", *SENSORS)
