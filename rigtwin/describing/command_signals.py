@@ -96,6 +96,26 @@ def force_command(log: Log, joint: str, measured: Collection[str]) -> LogSignal 
     return None
 
 
+def no_force(joint: str) -> LogSignal:
+    """Return the command of a joint that nothing pushes: 0 throughout.
+
+    Parameters
+    ----------
+    joint
+        Joint that swings freely.
+    """
+    return LogSignal(
+        joint=joint,
+        quantity=JointQuantity.FORCE_COMMAND,
+        column="",
+        formula="0",
+        unit="",
+        sign=1.0,
+        why="the model has no actuator for it",
+        assumed=(),
+    )
+
+
 def _source(log: Log, joint: str, quantity: JointQuantity) -> tuple[str, str, float]:
     """Column, reason and sign of a command."""
     source = log.slots.stated(joint, quantity)

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from rigtwin.describing.clock import find_clock
-from rigtwin.describing.matching import NUMBERED
+from rigtwin.describing.matching import ASSUMED
 from rigtwin.describing.reading import Reading, read_log
 from rigtwin.describing.writer import table_rows, write_description, write_map
 from rigtwin.description.bare import model_name, name_machine
@@ -67,8 +67,8 @@ class Described:
             lines.append(f"rows are uneven in time; resampled to {clock.resample:g} s")
         lines.append(f"test of {self.reading.kind.test}: {self.reading.kind.why}")
         for signal in self.reading.signals:
-            reasons = (signal.why,) if signal.why == NUMBERED else ()
-            # A match by number is an assumption. A match by name is not.
+            # A match by name is no assumption.
+            reasons = (signal.why,) if signal.why in ASSUMED else ()
             if remarks := (*reasons, *signal.assumed):
                 lines.append(f"{signal.key} from {signal.source}: {'; '.join(remarks)}")
         return (*lines, *self.reading.notes)

@@ -6,6 +6,8 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from rigtwin.describing.heading import read_words, split_words
 from rigtwin.describing.joint_names import QUANTITY_WORDS, Alias, list_aliases
 from rigtwin.describing.quantity import MEASURED, JointQuantity
@@ -15,7 +17,13 @@ from rigtwin.description.mechanism import Mechanism
 from rigtwin.importing.columns import Columns
 
 NUMBERED = "numbered in the order of the model's joints"
-"""Reason of a match by number, which is an assumption."""
+"""Reason of a match by number."""
+REMAINING = "the only column left for the model's joint"
+"""Reason of a match by elimination."""
+ASSUMED = (NUMBERED, REMAINING)
+"""Reasons of matches that are assumptions."""
+UNNAMED = "its name fits no joint"
+"""Reason why a column is not used."""
 
 
 @dataclass(frozen=True)
@@ -84,11 +92,14 @@ def match_columns(
         elif len(joints) == 1 and (match := _alone(column, words, unit, joints[0])) is not None:
             matches.append(match)
         else:
-            unused[column] = "its name fits no joint"
+            unused[column] = UNNAMED
     for family in _families(numbered).values():
         matched, reason = _by_number(family, numbered, columns.units, joints)
         matches += matched
         unused |= {column: reason for column in family} if reason else {}
+    if (match := _remaining(columns, joints, matches, unused)) is not None:
+        matches.append(match)
+        del unused[match.column]
     for match in matches:
         if match.quantity is JointQuantity.OTHER:
             unused[match.column] = "no test needs this quantity"
@@ -170,6 +181,27 @@ def _alone(column: str, words: tuple[str, ...], unit: str, joint: str) -> Match 
     return Match(column, joint, quantity, "the model has one joint", rank)
 
 
+def _remaining(
+    columns: Columns,
+    joints: Sequence[str],
+    matches: Sequence[Match],
+    unused: Mapping[str, str],
+) -> Match | None:
+    """The position of a model's only joint, by elimination; None unless one column is left."""
+    if len(joints) != 1 or any(match.quantity is JointQuantity.POSITION for match in matches):
+        return None
+    left = [
+        column
+        for column, why in unused.items()
+        if why == UNNAMED and np.ptp(columns.values[column][np.isfinite(columns.values[column])])
+    ]
+    # With a force or a command beside it, what remains can only be what they move.
+    moved = any(match.quantity is not JointQuantity.OTHER for match in matches)
+    if len(left) != 1 or not moved:
+        return None
+    return Match(left[0], joints[0], JointQuantity.POSITION, REMAINING, 0.5)
+
+
 def _families(numbered: Mapping[str, tuple[str, ...]]) -> dict[str, list[str]]:
     """Columns whose names differ by a number only."""
     families: dict[str, list[str]] = {}
@@ -197,7 +229,7 @@ def _by_number(
     if quantity is None and not meaning.unknown and set(rest) <= MEASURED:
         quantity = JointQuantity.POSITION
     if quantity is None or len(meaning.unknown) > 1:
-        return [], "its name fits no joint"
+        return [], UNNAMED
     if order is None:
         listed = ", ".join(map(str, sorted(numbers.values())))
         return [], f"numbered {listed}, and the model has {len(joints)} joints"

@@ -9,7 +9,7 @@ import numpy as np
 
 from rigtwin.describing.checks import motion_band
 from rigtwin.describing.clock import Clock, find_clock
-from rigtwin.describing.command_signals import force_command, position_command
+from rigtwin.describing.command_signals import force_command, no_force, position_command
 from rigtwin.describing.corrections import read_corrections
 from rigtwin.describing.force_signals import check_forces, force_signals, suggest_forces
 from rigtwin.describing.formulas import read_formula
@@ -22,7 +22,13 @@ from rigtwin.describing.replay_kind import ReplayKind, choose_kind
 from rigtwin.describing.signal import LogSignal
 from rigtwin.describing.slots import Slots
 from rigtwin.description.coupling import are_coupled
-from rigtwin.description.implied import FORCES, INVERSE, actuator_on, movable_joints
+from rigtwin.description.implied import (
+    FORCES,
+    INVERSE,
+    actuator_on,
+    movable_joints,
+    swinging,
+)
 from rigtwin.description.mechanism import Mechanism
 from rigtwin.errors import RigtwinError
 from rigtwin.importing.columns import Columns
@@ -189,6 +195,7 @@ def _movers(
 ) -> dict[str, LogSignal]:
     """Forces or commands that the test needs, by joint."""
     movers: dict[str, LogSignal] = {}
+    free = swinging(log.mechanism, list(positions)) if test == FORCES else []
     for joint, position in positions.items():
         mover: LogSignal | None = None
         if test == INVERSE:
@@ -197,6 +204,8 @@ def _movers(
                 log.questions.append(
                     f"no measured force of joint {joint}; say {option(f'{joint}.force', 'COLUMN')}"
                 )
+        elif joint in free:
+            mover = no_force(joint)
         elif actuator_on(log.mechanism, joint) is not None:
             mover = (
                 force_command(log, joint, {*forces, *still})

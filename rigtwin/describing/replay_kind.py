@@ -90,6 +90,10 @@ def choose_kind(
         if set(pushed) <= set(still):
             return ReplayKind(FORCES, "the force is 0 throughout: the joints swing freely")
         return ReplayKind(FORCES, "the actuators take forces, and those are in the log")
+    # A URDF cannot hold actuators, so that their absence says nothing.
+    unpowered = mechanism.model.nactuator == 0 and not mechanism.is_urdf
+    if unpowered and not measured and not commanded:
+        return ReplayKind(FORCES, "the model has no actuator: the joints swing freely")
     raise _question(mechanism, joints, measured, commanded)
 
 
@@ -121,6 +125,8 @@ def _question(
         answers = [option(f"{joint}.force", "COLUMN"), option(f"{joint}.command", "COLUMN")]
         if actuator_on(mechanism, joint):
             answers.append(option(f"{joint}.command", "0") + " if nothing pushes")
+        elif mechanism.is_urdf:
+            answers.append("--test force-commands if nothing pushes")
         return ask(
             "no column is a measured force or a command, so nothing says what moves "
             f"{enumerate_names(list(joints))}",

@@ -68,7 +68,9 @@ AT: dict[str, tuple[str, ...]] = {
     "schedule": ("joint",),
     "tyre": ("contact",),
     "cylinder": ("joint", "actuator"),
-    **dict.fromkeys((*PUSHING, "position actuator", "motor"), ("actuator",)),
+    **dict.fromkeys(("servo", "position actuator", "motor"), ("actuator",)),
+    # A force on a joint that the model has no actuator for, such as that of a hand.
+    "force actuator": ("actuator", "joint"),
     **dict.fromkeys(SENSED, ("sensor", "joint", "tendon")),
 }
 """Type of component → elements of an MJCF that it can stand for."""
@@ -353,12 +355,14 @@ class Components:
             component = component._replace(**self._mechanism.friction(element, mjcf))
         elif kind == "rotor" and (element == "tendon" or joint):
             component = component._replace(inertia=self._mechanism.armature(element, mjcf))
-        if kind in (*PUSHING, "position actuator"):
+        if element == "actuator" and kind in (*PUSHING, "position actuator"):
             obstacle = self._mechanism.actuator_obstacle(mjcf, kind)
             if obstacle is not None:
                 self.mistakes.note(where, f"actuator {mjcf!r}: {obstacle}")
                 return None
             component = component._replace(**self._mechanism.actuator_timing(mjcf))
+        if element != "actuator":
+            return component
         if kind == "position actuator":
             component = component._replace(**self._mechanism.rest_position(mjcf))
         elif kind == "force actuator":

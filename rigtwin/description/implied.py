@@ -156,16 +156,24 @@ def sensor_name(mechanism: Mechanism, joint: str, measured: str) -> str:
     return f"{name}_{measured}" if name == identifier(joint) else name
 
 
-def actuator_name(mechanism: Mechanism, joint: str) -> str | None:
-    """Return the name of the implied actuator of a joint; None if the model has no actuator."""
-    known = actuator_on(mechanism, joint)
-    if known is None:
-        return None
+def actuator_name(mechanism: Mechanism, joint: str) -> str:
+    """Return the name of the implied actuator of a joint."""
     # MJCF allows a joint, a sensor and an actuator of the same name; components do not.
-    name = identifier(known)
+    name = identifier(actuator_on(mechanism, joint) or joint)
     taken = {identifier(joint) for joint in movable_joints(mechanism)}
     taken |= {identifier(sensor) for sensor in mechanism.names("sensor")}
     return f"{name}_actuator" if name in taken else name
+
+
+def swinging(mechanism: Mechanism, joints: Sequence[str]) -> list[str]:
+    """Return the joints that swing freely: no actuator acts on them or on joints coupled to them.
+
+    Each has a force actuator of its own, whose command is 0 throughout.
+    """
+    lacking = [joint for joint in joints if actuator_on(mechanism, joint) is None]
+    if len(lacking) < len(joints) and are_coupled(mechanism, joints):
+        return []
+    return lacking
 
 
 def identifier(name: str) -> str:
@@ -197,13 +205,9 @@ def _expand_replay(
         if key in table:
             mistakes.note(where, f"{key} follows from test = {test!r}; leave one of them out")
             return
-    # Forces may leave joints without an actuator: they swing freely.
     missing = [j for j in joints if actuator_on(mechanism, j) is None]
     if test in (POSITIONS, SERVOS) and missing:
         mistakes.note(where, f"test = {test!r}: joint {missing[0]} has no position actuator")
-        return
-    if test == FORCES and len(missing) == len(joints):
-        mistakes.note(where, f"test = {test!r}: no actuator acts on {', '.join(joints)}")
         return
     keys = {key: value for key, value in table.items() if key not in KEYS}
     # Joints under position commands follow them whatever the load: coupling has no influence.
@@ -213,13 +217,21 @@ def _expand_replay(
         # One table becomes several replays, which need names of their own.
         group_keys = keys if len(groups) == 1 else {**keys, "name": identifier(group[0])}
         group_keys.setdefault("name", "all joints" if together else identifier(group[0]))
-        _add_group(test, group, group_keys, mechanism, implied)
+        _add_group(test, group, group_keys, mechanism, implied, swinging(mechanism, joints))
 
 
 def _add_group(
-    test: str, joints: Sequence[str], keys: dict[str, Any], mechanism: Mechanism, implied: Implied
+    test: str,
+    joints: Sequence[str],
+    keys: dict[str, Any],
+    mechanism: Mechanism,
+    implied: Implied,
+    free: Sequence[str],
 ) -> None:
-    """Add the components of joints that are replayed together, and their replay."""
+    """Add the components of joints that are replayed together, and their replay.
+
+    `free` are the joints that swing freely.
+    """
     tables = implied.components
     positions = [sensor_name(mechanism, joint, "position") for joint in joints]
     for joint, name in zip(joints, positions, strict=True):
@@ -250,14 +262,16 @@ def _add_group(
     movers: list[str] = []
     for joint in joints:
         actuator, name = actuator_on(mechanism, joint), actuator_name(mechanism, joint)
-        if actuator is None or name is None:
-            continue
-        tables[name] = {"actuator": actuator}
-        tables[name]["type"] = MOVERS[test]
-        movers.append(name)
+        if actuator is not None:
+            tables[name] = {"actuator": actuator, "type": MOVERS[test]}
+            movers.append(name)
+        elif joint in free:
+            tables[name] = {"joint": joint, "type": MOVERS[test], "effects": []}
+            movers.append(name)
     replay = {**keys, "moved_by": movers, "observe": positions}
     if test in (SERVOS, FORCES) and len(joints) == 1:
         _add_mass(mechanism, joints[0], tables)
+        _add_rotor(joints[0], tables)
         if test == FORCES and any(mechanism.joint(joints[0]).gravity):
             # The gravity load depends on the true angle, which makes the encoder's zero observable.
             tables[positions[0]]["effects"] = ["offset"]
@@ -267,10 +281,9 @@ def _add_group(
             tables[identifier(joint)]["effects"] = FREE
         for name in movers if test == SERVOS else ():
             tables[name]["effects"] = FREE_SERVO
-        # Without a force from an actuator, only ratios of friction to mass can be seen. One known
-        # force is enough, since coupled joints pass it on.
-        if movers:
-            _add_links(mechanism, joints, tables)
+        # Without a force from an actuator, only ratios of friction and masses to one of the masses
+        # can be seen. One known force is enough, since coupled joints pass it on.
+        _add_links(mechanism, joints[1:] if free else joints, tables)
     implied.replays.append(replay)
 
 

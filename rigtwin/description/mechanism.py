@@ -116,6 +116,8 @@ class Mechanism:
     ----------
     model
         Compiled model.
+    is_urdf
+        Whether the file is a URDF, which cannot hold actuators.
     """
 
     def __init__(self, path: Path) -> None:
@@ -124,6 +126,7 @@ class Mechanism:
             raise RigtwinError(f"model {path} does not exist")
         # The text is checked first: compiling a hostile file may take for ever or all memory.
         check_text(path)
+        self.is_urdf = path.suffix.lower() == ".urdf"
         try:
             self.model = compile_model(path)
         except ValueError as error:

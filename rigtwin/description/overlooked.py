@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import mujoco
 import numpy as np
 
+from rigtwin.components.sensors import MEASURES
 from rigtwin.description.machine import Component, ReplayOf
 from rigtwin.description.mechanism import Mechanism, Tie
 
@@ -52,7 +53,7 @@ def _followed_ties(
     if not free:
         return ()
     movers = [components[name] for replay in replays for name in replay.moved_by]
-    prescribed = [mover.joint for mover in movers if mover.element != "actuator"]
+    prescribed = [mover.joint for mover in movers if mover.component_type in MEASURES]
     dependent = {tie.joint for tie in mechanism.ties_of([*free, *prescribed])[0]}
     # An actuator on a dependent joint pushes the joint that is followed, and adds no moving joint.
     pushed = [mover.joint for mover in movers if mover.joint and mover.joint not in dependent]

@@ -427,6 +427,6 @@ def _is_wound_up(machine: Machine, recording: Recording) -> bool:
         if component.channel is None or component.element != "actuator":
             continue
         size = np.abs(recording.column(*component.channel))
-        if float(np.mean(size >= 0.99 * float(size.max()))) > WOUND_UP:
+        if np.any(size) and float(np.mean(size >= 0.99 * float(size.max()))) > WOUND_UP:
             return True
     return False

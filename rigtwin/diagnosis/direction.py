@@ -21,6 +21,9 @@ LEAST_MISFIT = 10.0
 """Misfit of a signal, in units of its noise, below which the direction is not questioned."""
 LEAST_RATIO = 3.0
 """Ratio of the forward to the backward misfit above which time runs backwards."""
+MOST_UNEXPLAINED = 0.3
+"""Share of a signal's swing that the backward prediction may miss. A swing that dies down faster
+than predicted is missed in both directions, and less from its quiet end."""
 
 
 def runs_backwards(
@@ -56,8 +59,15 @@ def runs_backwards(
     }
     reversed_recording = replace(recording, columns=columns)
     model = machine.physics.model(machine, reversed_recording.inputs, configuration, STEPS)
-    backward = _misfits(measured[:, ::-1], model.predict(configuration.plant))
-    return bool(np.isfinite(backward).all()) and LEAST_RATIO * rms(backward) < rms(forward)
+    replayed = measured[:, ::-1]
+    backward = _misfits(replayed, model.predict(configuration.plant))
+    # A constant prediction misses the whole swing.
+    whole = _misfits(replayed, np.zeros_like(replayed))
+    return (
+        bool(np.isfinite(backward).all())
+        and LEAST_RATIO * rms(backward) < rms(forward)
+        and rms(backward) < MOST_UNEXPLAINED * rms(whole)
+    )
 
 
 def _misfits(measured: Array, predicted: Array) -> Array:
