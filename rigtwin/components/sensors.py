@@ -243,8 +243,13 @@ def _lead(lag: float, delay: float, signal: Array, period: float) -> Array:
         low_pass = butter(2, min(INVERTIBLE, 0.4 / period), fs=1.0 / period, output="sos")
         ahead = signal + lag * np.gradient(sosfiltfilt(low_pass, signal), period)
     if delay > 0.0:
+        from scipy.interpolate import make_interp_spline
+
+        # Linear interpolation between two samples would smooth their noise, and so explain some of
+        # it.
         ticks = np.arange(len(signal))
-        ahead = np.interp(ticks + delay / period, ticks, ahead)
+        spline = make_interp_spline(ticks, ahead, k=min(3, len(signal) - 1))
+        ahead = spline(np.minimum(ticks + delay / period, ticks[-1]))
     return ahead
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from typing import Any
 
@@ -298,8 +299,11 @@ class Replays:
         """
         declared = {(known.group, known.parameter) for known in self._components.tolerances}
         for replay in replays:
-            # Coupled joints: observed sensors are timed against all prescribed motions at once.
-            longest = self._components.physics(replays).longest_delay
+            # Forces are timed against the measured motion. What answers to a command is late.
+            kinds = [self._components.types[name] for name in replay.moved_by]
+            prescribed = bool(kinds) and all(kind in SENSED for kind in kinds)
+            physics = self._components.physics(replays)
+            longest = math.inf if prescribed else physics.longest_delay
             for name in (row.name for row in replay.rows if row.kind != "command"):
                 # A sensor inside a simulated loop is sampled together with the controller.
                 if (name, "delay") not in declared and not replay.closed:

@@ -37,6 +37,7 @@ from rigtwin.diagnosis.findings import (
     describe_attributed,
     find_nearest,
     find_traces,
+    is_timing,
     list_unobservable,
     measure_support,
 )
@@ -293,12 +294,12 @@ def _judge(
 ) -> _Judged:
     """Choose the effects that are named, and validate them on held-out data."""
     support = measure_support(explanation, evidence, thresholds)
-    chosen = choose_named(explanation, support, thresholds)
+    chosen = choose_named(explanation, support, evidence, thresholds)
     validation = validate(
         evidence, explanation.fit, chosen, explanation.posterior, held_out, thresholds
     )
     named, notes = validation.accepted, []
-    has_residual = _has_residual(explanation, named)
+    has_residual = _has_residual(explanation, evidence, named)
     if validation.rejected:
         names = " and ".join(effect.name for effect in validation.rejected)
         notes.append(f"{names} rejected: the prediction of held-out data became worse with it")
@@ -312,10 +313,16 @@ def _judge(
     return _Judged(explanation, support, validation, named, has_residual, plant, tuple(notes))
 
 
-def _has_residual(explanation: Explanation, named: Sequence[Effect]) -> bool:
+def _has_residual(explanation: Explanation, evidence: Evidence, named: Sequence[Effect]) -> bool:
     """Return whether more than noise and declared error remains after the named effects."""
-    posterior = explanation.posterior
-    if set(named) == set(posterior.best.fit.effects):
+    posterior, fit = explanation.posterior, explanation.fit
+    # A shift within the tolerance of the sampling time leaves no residual.
+    findings = {
+        effect
+        for effect, values in zip(fit.effects, fit.values, strict=True)
+        if not is_timing(effect, values, evidence)
+    }
+    if set(named) == findings:
         return posterior.has_unexplained_residual
     # The named effects may be another scored hypothesis than the best one.
     identical = [

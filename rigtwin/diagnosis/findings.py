@@ -16,6 +16,7 @@ from rigtwin.diagnosis.finding import Estimate, Finding, Name, Nearest, Rival, U
 from rigtwin.diagnosis.fit import Fit
 from rigtwin.diagnosis.posterior import HypothesisPosterior
 from rigtwin.diagnosis.scoring import Scored
+from rigtwin.diagnosis.starts import LATE_BY_TIME
 from rigtwin.diagnosis.support import Support
 from rigtwin.diagnosis.thresholds import STANDARD, Thresholds
 
@@ -55,7 +56,10 @@ def measure_support(
 
 
 def choose_named(
-    explanation: Explanation, support: dict[Effect, Support], thresholds: Thresholds
+    explanation: Explanation,
+    support: dict[Effect, Support],
+    evidence: Evidence,
+    thresholds: Thresholds,
 ) -> tuple[Effect, ...]:
     """Choose the effects of the best hypothesis that are named.
 
@@ -69,6 +73,8 @@ def choose_named(
         Result of the search.
     support
         Support of each effect of the best hypothesis.
+    evidence
+        Recordings that were fitted.
     thresholds
         Thresholds of the diagnosis.
 
@@ -87,7 +93,7 @@ def choose_named(
         # Standard errors with all their parts are used, also those of residual and hypotheses, as
         # the answer shows them.
         steadiness = effect.steadiness(values, widths, posterior.nominal)
-        if steadiness <= thresholds.interval_half_width:
+        if steadiness <= thresholds.interval_half_width or is_timing(effect, values, evidence):
             # The interval holds the nominal value, so the data do not ask for a change.
             continue
         shares = [
@@ -100,6 +106,34 @@ def choose_named(
         if probability >= thresholds.naming_confidence and members <= thresholds.rival_count:
             named.append(effect)
     return tuple(named)
+
+
+def is_timing(effect: Effect, values: Sequence[float], evidence: Evidence) -> bool:
+    """Return whether an effect shifts a signal by no more than the tolerance of its sampling.
+
+    Parameters
+    ----------
+    effect
+        Effect that was fitted.
+    values
+        Values of its parameters, SI.
+    evidence
+        Recordings that were fitted.
+
+    Returns
+    -------
+    bool
+        True for a lag or delay that is no finding.
+    """
+    if effect.kind.name not in LATE_BY_TIME:
+        return False
+    (shift,) = effect.distances(values, evidence.plant)
+    return shift <= _timing(evidence)
+
+
+def _timing(evidence: Evidence) -> float:
+    """Return the tolerance of the sampling time within a tick, s."""
+    return max((evidence.width(t) for t in evidence.machine.tolerances if t.ticks), default=0.0)
 
 
 def describe_attributed(
@@ -388,10 +422,9 @@ def estimates(
     """
     nominal = effect.nominal(evidence.plant)
     # The instant of sampling within a tick is a tolerance, so no delay is known better than that.
-    timing = max((evidence.width(t) for t in evidence.machine.tolerances if t.ticks), default=0.0)
     # Divided here because the interval is `wider` times as wide: half of it is then at least the
     # tolerance.
-    least = {"delay": timing / wider}
+    least = dict.fromkeys(LATE_BY_TIME, _timing(evidence) / wider)
     return {
         name: Estimate(
             value,

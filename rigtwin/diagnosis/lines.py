@@ -119,25 +119,28 @@ def weigh_lines(
     if propagated is not None:
         # A controller's command has no noise of its own; that of its sensors is propagated.
         floor[[row.kind == "command" for row in machine.rows]] = 0.0
-    # Noise was filtered before ticks were left out, so none is folded into the band.
-    folded = 1.0 / model.every if limited else 1.0
-    spread = _noise_variance(machine, fade, floor, propagated, folded, length, len(frequency))
-    error = _declared_error(machine, fade, measured, length, len(frequency))
-    weight = off_mains / np.sqrt(spread + error + 1e-300)
+    noise = floor
     if limited:
         # The band limit leaves only the share of white noise within it, and smooths the bits.
-        floor = floor * math.sqrt(min(2.0 * model.band * recording.period, 1.0))
+        noise = noise * math.sqrt(min(2.0 * model.band * recording.period, 1.0))
         resolution = np.zeros_like(resolution)
     if propagated is not None:
-        floor = np.sqrt(floor**2 + np.var(propagated, axis=1))
-    floor = np.maximum(floor, 1e-300)
+        noise = np.sqrt(noise**2 + np.var(propagated, axis=1))
+    noise = np.maximum(noise, 1e-300)
+    # Noise was filtered before ticks were left out, so none is folded into the band.
+    folded = 1.0 / model.every if limited else 1.0
+    spread = _noise_variance(
+        machine, fade, floor, noise, propagated, folded, length, len(frequency)
+    )
+    error = _declared_error(machine, fade, measured, length, len(frequency))
+    weight = off_mains / np.sqrt(spread + error + 1e-300)
     return Lines(
         frequency=frequency,
         weight=weight,
         spread=spread,
         fade=fade,
         measured=measured,
-        noise=floor,
+        noise=noise,
         bit=resolution,
         length=length,
         period=period,
@@ -207,6 +210,7 @@ def _noise_variance(
     machine: Machine,
     fade: Array,
     floor: Array,
+    noise: Array,
     propagated: Array | None,
     folded: float,
     length: int,
@@ -214,8 +218,9 @@ def _noise_variance(
 ) -> Array:
     """Return the variance of noise in real and imaginary part of each line, n of the equation.
 
-    `propagated` is a draw of the noise that a measured motion adds to the prediction, shape (rows,
-    ticks). `folded` is the share of white noise that leaving out ticks does not alias.
+    `floor` is the noise of each signal and `noise` that of its residual. `propagated` is a draw of
+    the noise that a measured motion adds to the prediction, shape (rows, ticks). `folded` is the
+    share of white noise that leaving out ticks does not alias.
     """
     spread = np.empty((len(fade), count))
     for row in range(len(fade)):
@@ -223,7 +228,8 @@ def _noise_variance(
         # half of it in the real part.
         spread[row] = 0.5 * float(fade[row] @ fade[row]) * folded * floor[row] ** 2
         if propagated is not None:
-            height = SPIKE * float(floor[row]) if machine.rows[row].kind in JUMPS else 0.0
+            # Spikes are judged by the noise of the residual, from which they are removed as well.
+            height = SPIKE * float(noise[row]) if machine.rows[row].kind in JUMPS else 0.0
             spread[row] += spectrum_of_noise(propagated[row], fade[row], length, height)[:count]
     return spread
 

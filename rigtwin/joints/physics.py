@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -223,7 +222,6 @@ class PrescribedJoints(IndependentJoints):
     # Inverse dynamics needs the same forces either way.
     reversible = True
     lacks_stops = True
-    longest_delay = math.inf
     least_period = SPARSE
 
     def claims(self, types: Mapping[str, type], replays: Sequence[ReplayOf]) -> bool:

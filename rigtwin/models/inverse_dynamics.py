@@ -32,7 +32,7 @@ from rigtwin.models.basis import Passage, forms
 from rigtwin.models.joint import SEED, SMALL
 from rigtwin.models.joint_inverse import resist, resist_at_once
 from rigtwin.models.joint_simulation import KEPT
-from rigtwin.models.measured_motion import ELASTIC, recover_motion, softest_contact
+from rigtwin.models.measured_motion import ELASTIC, ENDS, recover_motion, softest_contact
 from rigtwin.models.model import Form, Model
 from rigtwin.models.rigid import RigidBodies
 from rigtwin.numerics.arrays import Array
@@ -43,8 +43,6 @@ from rigtwin.signals.noise import smooth, white_noise
 
 STANDING, RESTING = 0.02, 0.1
 """Share of its rms speed below which a joint stands still, and shortest rest, s."""
-ENDS = 0.3
-"""Time at both ends of a recording where the smoothed motion is uncertain, s."""
 REGRESSORS = 40
 """Number of remembered regressors. A search returns to few motions."""
 DRAWS = 2

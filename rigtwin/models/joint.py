@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rigtwin.components.effect import Motion
 from rigtwin.components.plant import Plant
@@ -16,7 +17,7 @@ from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Machine, ReplayOf, Row
 from rigtwin.models.basis import Passage, forms
 from rigtwin.models.joint_simulation import JointSimulation
-from rigtwin.models.measured_motion import recover_motion
+from rigtwin.models.measured_motion import ENDS, recover_motion
 from rigtwin.models.model import Form, Model
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Inputs
@@ -27,6 +28,8 @@ INERTIAL = 0.1
 """Share of inertia in the measured force above which the band of the motion limits the force."""
 SMALL = 0.02
 """Size of a small disturbance, as a share of the signal's standard deviation."""
+SHORTEST_END = 20
+"""Divisor of a recording's length that gives the largest part left out at each end."""
 SEED = 7
 """Seed of the noise that is propagated through the machine."""
 PLACES = {"position": 0, "velocity": 1, "force": 2, "command": 3}
@@ -195,6 +198,21 @@ class JointModel(Model[Plant]):
         motion = np.stack([position, velocity, np.gradient(velocity, self._period)])
         required = self._joint.required_force(plant, np.ascontiguousarray(motion), error)
         return required - self._joint.recorded_push(plant, position, velocity)
+
+    def undetermined(self) -> NDArray[np.bool_] | None:
+        """Return the ticks at both ends of a measured motion, whose acceleration is unknown there.
+
+        None where no force follows from a smoothed motion.
+        """
+        joint = self._joint
+        if joint.motion is None or joint.integrated or joint.error == 0.0:
+            return None
+        ticks = self.move(self._configuration.plant).shape[1]
+        unknown = np.zeros((len(self.rows), ticks), bool)
+        # A short recording keeps most of its ticks.
+        end = min(round(ENDS / joint.interval), ticks // SHORTEST_END)
+        unknown[:, :end] = unknown[:, unknown.shape[1] - end :] = True
+        return unknown
 
     def propagated_noise(self, plant: Plant) -> Array | None:
         """Return the change of the predictions by the noise of the inputs, shape (rows, ticks).

@@ -9,6 +9,8 @@ from rigtwin.components.guide import friction, friction_size
 from rigtwin.components.sensors import Sensor, remove_drift
 from rigtwin.numerics.arrays import Array
 
+ENDS = 0.3
+"""Time at both ends of a recording where the acceleration of a smoothed motion is uncertain, s."""
 ELASTIC = 0.3
 """Shortest distance over which friction that reverses builds up, in errors of the measured motion.
 Without it, friction would jump with the noise of the velocity's sign."""
