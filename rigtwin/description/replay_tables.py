@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping
 from typing import Any
 
@@ -18,6 +17,9 @@ from rigtwin.errors import RigtwinError
 
 TICKS_LATE = 0.5
 """Default tolerance of the sampling time of a signal, ticks."""
+HELD = 2.5e-3
+"""Largest sampling delay of a force against a measured motion, s: half a tick of a controller of
+200 Hz. A log of fewer rows may come from a faster controller."""
 NO_JOINT = Joint("", False, 0.0, (-1.0, 1.0), (0.0, 0.0), 0.0)
 """Joint of a replay that covers a whole machine."""
 
@@ -303,7 +305,7 @@ class Replays:
             kinds = [self._components.types[name] for name in replay.moved_by]
             prescribed = bool(kinds) and all(kind in SENSED for kind in kinds)
             physics = self._components.physics(replays)
-            longest = math.inf if prescribed else physics.longest_delay
+            longest = HELD if prescribed else physics.longest_delay
             for name in (row.name for row in replay.rows if row.kind != "command"):
                 # A sensor inside a simulated loop is sampled together with the controller.
                 if (name, "delay") not in declared and not replay.closed:

@@ -407,9 +407,9 @@ class Evidence:
             width = self.width(tolerance)
             after, scale = self.predict(tolerance.shift(plant, width)), 1.0
             start = before
-            if (tolerance.mechanical or tolerance.ticks) and width > 0.0:
-                # Stick and slip respond differently to a rise and a fall of a parameter, and a
-                # signal to a lead and a delay. A central difference cancels half of that asymmetry.
+            if tolerance.mechanical and width > 0.0:
+                # Stick and slip respond differently to a rise and a fall of a parameter. A central
+                # difference cancels half of that asymmetry.
                 start, scale = self.predict(tolerance.shift(plant, -width)), 0.5
             columns.append(
                 self.whiten([scale * (b - a) for a, b in zip(start, after, strict=True)])

@@ -254,7 +254,7 @@ class HypothesisSearch:
             # One set of effects may be fitted from many starts. Only its best minimum is a
             # hypothesis; several would share the weight of one.
             known = self.pool.get(key)
-            if known is None or scored.fit.misfit < known.fit.misfit:
+            if known is None or _rank(scored) < _rank(known):
                 self.pool[key] = scored
 
     def _settle(self, fits: Sequence[Fit]) -> None:
@@ -464,3 +464,8 @@ class HypothesisSearch:
         regular = [fit for fit in singles[: 2 * BEGINNINGS] if fit.effects[0].kind.name in REGULAR]
         balanced = [start for fit in regular for start in start_balanced(self.coarse, fit.effects)]
         return [*self._refine(balanced), *fresh[:BEGINNINGS]]
+
+
+def _rank(scored: Scored) -> tuple[bool, float]:
+    """Return the order of minima of one set of effects: bounded ones last, then by misfit."""
+    return scored.bounded, scored.fit.misfit
