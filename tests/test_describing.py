@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -379,3 +380,70 @@ def test_the_command_prints_what_was_taken_for_what(
     assert "expected KEY=SOURCE" in capsys.readouterr().err
     assert main(["diagnose", str(log), "--machine", "damper-bench", "--column", "time=t"]) == 1
     assert "--machine arm.xml" in capsys.readouterr().err
+
+
+SWING = """<mujoco><option timestep="0.0005" integrator="RK4"/><worldbody><body name="rod">
+<joint name="pivot" axis="0 1 0" damping="{damping}"/>
+<inertial pos="0 0 -0.25" mass="0.5" diaginertia="0.01 0.01 0.001"/></body></worldbody></mujoco>"""
+
+
+def test_joints_of_a_model_without_actuators_swing_freely(tmp_path: Path):
+    model = mujoco.MjModel.from_xml_string(SWING.format(damping=0.012))
+    data = mujoco.MjData(model)
+    data.qpos[:] = 1.2
+    rows = []
+    for _ in range(1000):
+        rows.append([0.01 * len(rows), *data.qpos])
+        mujoco.mj_step(model, data, 20)
+    noise = 3e-4 * np.random.default_rng(5).standard_normal(len(rows))
+    log = tmp_path / "log.csv"
+    table = np.array(rows) + np.stack([np.zeros(len(rows)), noise], axis=1)
+    np.savetxt(log, table, delimiter=",", header="time,pivot", comments="")
+    (tmp_path / "model.xml").write_text(SWING.format(damping=0.001))
+    answer = rigtwin.describe(tmp_path / "model.xml", log)
+    assert answer.reading.kind.why == "the model has no actuator: the joints swing freely"
+    (effect,) = rigtwin.diagnose(log, machine=tmp_path / "model.xml").effects
+    assert str(effect.name) == "viscous@pivot"
+    assert effect.parameters["viscous"].value == pytest.approx(0.012, rel=0.02)
+
+
+def test_the_only_column_left_is_the_position_of_the_only_joint(tmp_path: Path):
+    text = """<mujoco><worldbody><body name="cart"><joint name="rail" type="slide" axis="1 0 0"/>
+    <geom type="box" size=".1 .1 .1" mass="2.5"/></body></worldbody>
+    <actuator><motor name="push" joint="rail"/></actuator></mujoco>"""
+    (tmp_path / "cart.xml").write_text(text)
+    time = 0.005 * np.arange(2000)
+    x = 0.2 * np.sin(5.0 * time) + 0.1 * np.sin(8.3 * time)
+    force = 2.5 * (-0.2 * 25.0 * np.sin(5.0 * time) - 0.1 * 8.3**2 * np.sin(8.3 * time))
+    log = tmp_path / "log.csv"
+    table = np.stack([time, force, x], axis=1)
+    np.savetxt(log, table, delimiter=",", header="t,force,x", comments="")
+    answer = rigtwin.describe(tmp_path / "cart.xml", log)
+    assert sources(answer)["rail.position"] == "x"
+    assert any("the only column left" in line for line in answer.assumptions)
+
+
+@pytest.mark.parametrize(("stiffness", "named"), [(120.0, []), (150.0, ["stiffness@rail"])])
+def test_a_held_force_half_a_row_early_is_no_gap(tmp_path: Path, stiffness: float, named):
+    """A controller holds its force from row to row, and the logged force has no noise."""
+    text = """<mujoco><option timestep="0.0005" integrator="implicitfast"/><worldbody>
+    <body name="cart"><joint name="rail" type="slide" axis="1 0 0" stiffness="{}" damping="3"/>
+    <geom type="box" size=".1 .1 .1" mass="2.5"/></body></worldbody>
+    <actuator><motor name="push" joint="rail"/></actuator></mujoco>"""
+    (tmp_path / "cart.xml").write_text(text.format(120.0))
+    model = mujoco.MjModel.from_xml_string(text.format(stiffness))
+    data, random = mujoco.MjData(model), np.random.default_rng(11)
+    time = 0.005 * np.arange(3000)
+    force = sum(
+        5.0 * np.sin(2.0 * np.pi * f * time + p) for f, p in ((0.4, 0.3), (1.25, 2.0), (2.2, 4.0))
+    )
+    rows = []
+    for now, push in zip(time, force, strict=True):
+        rows.append([now, push, data.qpos[0] + 2e-6 * random.standard_normal()])
+        data.ctrl[:] = push
+        mujoco.mj_step(model, data, 10)
+    log = tmp_path / "log.csv"
+    np.savetxt(log, rows, delimiter=",", header="t,force,x", comments="")
+    diagnosis = rigtwin.diagnose(log, machine=tmp_path / "cart.xml")
+    assert [str(effect.name) for effect in diagnosis.effects] == named
+    assert diagnosis.answer.verdict == ("explained" if named else "no gap")

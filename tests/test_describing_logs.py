@@ -182,7 +182,6 @@ JOINTS = ("shoulder", "elbow")
         ('test = "servos"', "joint shoulder has no position actuator"),
         ('test = "inverse dynamics"\njoints = ["wrist"]', "'wrist' is no hinge or slide"),
         ('test = "inverse dynamics"\njoints = []', "expected a list of joints"),
-        ('test = "force commands"', "no actuator acts on shoulder, elbow"),
         ('test = "inverse dynamics"\nfree = ["elbow"]', "leave one of them out"),
     ],
 )

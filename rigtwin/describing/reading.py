@@ -18,7 +18,7 @@ from rigtwin.describing.matching import Match, match_columns
 from rigtwin.describing.position_signals import ask_positions, position_signals
 from rigtwin.describing.quantity import JointQuantity
 from rigtwin.describing.question import Question, enumerate_names, option
-from rigtwin.describing.replay_kind import ReplayKind, choose_kind
+from rigtwin.describing.replay_kind import ReplayKind, choose_kind, free_swing
 from rigtwin.describing.signal import LogSignal
 from rigtwin.describing.slots import Slots
 from rigtwin.description.coupling import are_coupled
@@ -141,9 +141,12 @@ def _choose_movers(
         # A suggestion by the data is worth more than the general question, which follows where
         # there is none.
         suggest_forces(log, joints, positions, forces)
-        if len(log.questions) == before:
-            log.questions.append(str(question))
-        raise _all_questions(log, signals) from None
+        swing = free_swing(log.mechanism, log.slots, joints)
+        if len(log.questions) > before or swing is None:
+            if len(log.questions) == before:
+                log.questions.append(str(question))
+            raise _all_questions(log, signals) from None
+        kind = swing
     movers = _movers(log, kind.test, positions, forces, still)
     if log.questions:
         raise _all_questions(log, signals)

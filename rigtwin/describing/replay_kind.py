@@ -13,6 +13,14 @@ from rigtwin.description.mechanism import Mechanism
 from rigtwin.description.mistakes import suggest
 from rigtwin.errors import RigtwinError
 
+MOVING = (
+    JointQuantity.FORCE,
+    JointQuantity.CURRENT,
+    JointQuantity.COMMAND,
+    JointQuantity.FORCE_COMMAND,
+)
+"""Quantities of what moves a joint."""
+
 
 @dataclass(frozen=True)
 class ReplayKind:
@@ -90,11 +98,27 @@ def choose_kind(
         if set(pushed) <= set(still):
             return ReplayKind(FORCES, "the force is 0 throughout: the joints swing freely")
         return ReplayKind(FORCES, "the actuators take forces, and those are in the log")
-    # A URDF cannot hold actuators, so that their absence says nothing.
-    unpowered = mechanism.model.nactuator == 0 and not mechanism.is_urdf
-    if unpowered and not measured and not commanded:
-        return ReplayKind(FORCES, "the model has no actuator: the joints swing freely")
     raise _question(mechanism, joints, measured, commanded)
+
+
+def free_swing(mechanism: Mechanism, slots: Slots, joints: Sequence[str]) -> ReplayKind | None:
+    """Return the kind of a free swing; None where something may move the joints.
+
+    Parameters
+    ----------
+    mechanism
+        The compiled MJCF or URDF.
+    slots
+        Columns that the log offers.
+    joints
+        Joints whose position the log holds.
+    """
+    # A URDF cannot hold actuators, so that their absence says nothing.
+    if mechanism.model.nactuator or mechanism.is_urdf:
+        return None
+    if any(slots.joints(quantity, joints) for quantity in MOVING):
+        return None
+    return ReplayKind(FORCES, "the model has no actuator: the joints swing freely")
 
 
 def _takes_position(mechanism: Mechanism, joint: str) -> bool:
