@@ -434,9 +434,10 @@ def test_a_held_force_half_a_row_early_is_no_gap(tmp_path: Path, stiffness: floa
     model = mujoco.MjModel.from_xml_string(text.format(stiffness))
     data, random = mujoco.MjData(model), np.random.default_rng(11)
     time = 0.005 * np.arange(3000)
-    force = sum(
+    waves = [
         5.0 * np.sin(2.0 * np.pi * f * time + p) for f, p in ((0.4, 0.3), (1.25, 2.0), (2.2, 4.0))
-    )
+    ]
+    force = np.sum(waves, axis=0)
     rows = []
     for now, push in zip(time, force, strict=True):
         rows.append([now, push, data.qpos[0] + 2e-6 * random.standard_normal()])

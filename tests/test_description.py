@@ -172,7 +172,7 @@ MISTAKES = [
     (
         'sensor = "encoder"',
         'sensor = "encoder"\ntype = "force actuator"',
-        "type 'force actuator' goes with actuator or joint, not with sensor 'encoder'; expected position",
+        "type 'force actuator' goes with actuator or joint, not with sensor 'encoder'; expected",
     ),
     (
         'sensor = "encoder"',

@@ -424,7 +424,7 @@ def estimates(
     # The instant of sampling within a tick is a tolerance, so no delay is known better than that.
     # Divided here because the interval is `wider` times as wide: half of it is then at least the
     # tolerance.
-    least = dict.fromkeys(LATE_BY_TIME, _timing(evidence) / wider)
+    least: dict[str, float] = {name: _timing(evidence) / wider for name in LATE_BY_TIME}
     return {
         name: Estimate(
             value,
