@@ -448,3 +448,25 @@ def test_a_held_force_half_a_row_early_is_no_gap(tmp_path: Path, stiffness: floa
     diagnosis = rigtwin.diagnose(log, machine=tmp_path / "cart.xml")
     assert [str(effect.name) for effect in diagnosis.effects] == named
     assert diagnosis.answer.verdict == ("explained" if named else "no gap")
+
+
+def test_a_column_of_texts_is_no_position(tmp_path: Path):
+    text = """<mujoco><worldbody><body name="cart"><joint name="rail" type="slide" axis="1 0 0"/>
+    <geom type="box" size=".1 .1 .1"/></body></worldbody>
+    <actuator><motor name="push" joint="rail"/></actuator></mujoco>"""
+    (tmp_path / "cart.xml").write_text(text)
+    rows = [f"{0.01 * n:.2f},{math.sin(0.1 * n):.4f},fine" for n in range(300)]
+    (tmp_path / "log.csv").write_text("\n".join(["t,force,remark", *rows]))
+    with pytest.raises(RigtwinError, match="no column is named as the position of rail"):
+        rigtwin.describe(tmp_path / "cart.xml", tmp_path / "log.csv")
+
+
+def test_a_body_named_like_a_rotor_keeps_its_mass(tmp_path: Path):
+    model = SWING.format(damping=0.001).replace('name="rod"', 'name="pivot_rotor"')
+    (tmp_path / "model.xml").write_text(model)
+    time = 0.01 * np.arange(600)
+    table = np.stack([time, np.cos(5.0 * time)], axis=1)
+    np.savetxt(tmp_path / "log.csv", table, delimiter=",", header="time,pivot", comments="")
+    machine = rigtwin.describe(tmp_path / "model.xml", tmp_path / "log.csv").machine
+    names = {str(effect.name) for effect in machine.effects()}
+    assert {"mass@pivot_rotor", "armature@pivot_rotor_inertia"} <= names

@@ -12,7 +12,7 @@ from rigtwin.describing.quantity import SI, JointQuantity
 from rigtwin.describing.question import Question, option
 from rigtwin.describing.signal import LogSignal
 from rigtwin.describing.units import Unit, actuator_constant, command_unit
-from rigtwin.description.implied import actuator_on
+from rigtwin.description.joint_elements import actuator_on
 from rigtwin.numerics.arrays import Array
 
 OPPOSED = -0.5

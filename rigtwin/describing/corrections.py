@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from rigtwin.describing.quantity import JointQuantity
-from rigtwin.description.implied import movable_joints
+from rigtwin.description.joint_elements import movable_joints
 from rigtwin.description.mechanism import Mechanism
 from rigtwin.description.mistakes import suggest
 from rigtwin.errors import RigtwinError

@@ -13,7 +13,7 @@ from rigtwin.describing.quantity import SI, JointQuantity
 from rigtwin.describing.question import Question, ask, enumerate_names, option
 from rigtwin.describing.signal import LogSignal
 from rigtwin.describing.units import Unit, actuator_constant, force_unit
-from rigtwin.description.implied import actuator_on
+from rigtwin.description.joint_elements import actuator_on
 from rigtwin.numerics.arrays import Array
 
 SLOPE_LOW, SLOPE_HIGH = 0.2, 5.0

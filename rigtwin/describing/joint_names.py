@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from rigtwin.describing.heading import split_words
 from rigtwin.describing.quantity import COMMANDED, MEASURED, WORDS, JointQuantity
-from rigtwin.description.implied import movable_joints
+from rigtwin.description.joint_elements import movable_joints
 from rigtwin.description.mechanism import Mechanism
 
 QUANTITY_WORDS = frozenset().union(*WORDS.values())

@@ -12,9 +12,10 @@ from rigtwin.describing.heading import read_words, split_words
 from rigtwin.describing.joint_names import QUANTITY_WORDS, Alias, list_aliases
 from rigtwin.describing.quantity import MEASURED, JointQuantity
 from rigtwin.describing.question import enumerate_names
-from rigtwin.description.implied import movable_joints
+from rigtwin.description.joint_elements import movable_joints
 from rigtwin.description.mechanism import Mechanism
 from rigtwin.importing.columns import Columns
+from rigtwin.numerics.arrays import Array
 
 NUMBERED = "numbered in the order of the model's joints"
 """Reason of a match by number."""
@@ -193,13 +194,19 @@ def _remaining(
     left = [
         column
         for column, why in unused.items()
-        if why == UNNAMED and np.ptp(columns.values[column][np.isfinite(columns.values[column])])
+        if why == UNNAMED and _varies(columns.values[column])
     ]
     # With a force or a command beside it, what remains can only be what they move.
     moved = any(match.quantity is not JointQuantity.OTHER for match in matches)
     if len(left) != 1 or not moved:
         return None
     return Match(left[0], joints[0], JointQuantity.POSITION, REMAINING, 0.5)
+
+
+def _varies(values: Array) -> bool:
+    """Whether a column holds at least two different numbers; texts are NaN."""
+    numbers = values[np.isfinite(values)]
+    return len(numbers) > 0 and float(np.ptp(numbers)) > 0.0
 
 
 def _families(numbered: Mapping[str, tuple[str, ...]]) -> dict[str, list[str]]:

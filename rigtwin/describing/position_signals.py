@@ -9,7 +9,7 @@ from rigtwin.describing.quantity import JointQuantity
 from rigtwin.describing.question import Question, ask, enumerate_names, option
 from rigtwin.describing.signal import LogSignal
 from rigtwin.describing.units import Unit, position_units
-from rigtwin.description.implied import movable_joints
+from rigtwin.description.joint_elements import movable_joints
 from rigtwin.errors import RigtwinError
 
 

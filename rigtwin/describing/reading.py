@@ -22,13 +22,8 @@ from rigtwin.describing.replay_kind import ReplayKind, choose_kind, free_swing
 from rigtwin.describing.signal import LogSignal
 from rigtwin.describing.slots import Slots
 from rigtwin.description.coupling import are_coupled
-from rigtwin.description.implied import (
-    FORCES,
-    INVERSE,
-    actuator_on,
-    movable_joints,
-    swinging,
-)
+from rigtwin.description.implied import FORCES, INVERSE
+from rigtwin.description.joint_elements import actuator_on, movable_joints, swinging
 from rigtwin.description.mechanism import Mechanism
 from rigtwin.errors import RigtwinError
 from rigtwin.importing.columns import Columns

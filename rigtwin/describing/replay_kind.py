@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from rigtwin.describing.quantity import JointQuantity
 from rigtwin.describing.question import ask, enumerate_names, option
 from rigtwin.describing.slots import Slots
-from rigtwin.description.implied import FORCES, INVERSE, POSITIONS, SERVOS, TESTS, actuator_on
+from rigtwin.description.implied import FORCES, INVERSE, POSITIONS, SERVOS, TESTS
+from rigtwin.description.joint_elements import actuator_on
 from rigtwin.description.mechanism import Mechanism
 from rigtwin.description.mistakes import suggest
 from rigtwin.errors import RigtwinError

@@ -9,10 +9,8 @@ from rigtwin.describing.formulas import read_formula
 from rigtwin.describing.quantity import JointQuantity
 from rigtwin.describing.reading import Reading
 from rigtwin.describing.signal import LogSignal
-from rigtwin.description.implied import (
-    FORCES,
-    INVERSE,
-    TESTS,
+from rigtwin.description.implied import FORCES, INVERSE, TESTS
+from rigtwin.description.joint_elements import (
     actuator_name,
     identifier,
     movable_joints,

@@ -10,7 +10,8 @@ import json
 from pathlib import Path
 
 from rigtwin.description.document import examine_text
-from rigtwin.description.implied import INVERSE, SERVOS, actuator_on, movable_joints
+from rigtwin.description.implied import INVERSE, SERVOS
+from rigtwin.description.joint_elements import actuator_on, movable_joints
 from rigtwin.description.machine import Machine
 from rigtwin.description.mechanism import Mechanism
 from rigtwin.errors import RigtwinError

@@ -3,14 +3,21 @@ description need not write them down."""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-import mujoco
-
 from rigtwin.description.coupling import are_coupled
+from rigtwin.description.joint_elements import (
+    actuator_name,
+    actuator_on,
+    body_of,
+    identifier,
+    movable_joints,
+    sensor_name,
+    sensor_on,
+    swinging,
+)
 from rigtwin.description.mechanism import Mechanism
 from rigtwin.description.mistakes import Mistakes, suggest
 
@@ -123,65 +130,6 @@ def expand(
     return {**document, "components": components, "replays": implied.replays}
 
 
-def movable_joints(mechanism: Mechanism) -> list[str]:
-    """Return the names of the hinges and slides of a model, in the order of the model."""
-    model = mechanism.model
-    # Free and ball joints have several coordinates, which no channel holds.
-    single = (mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtJoint.mjJNT_HINGE)
-    numbers = [n for n in range(model.njnt) if int(model.jnt_type[n]) in single]
-    return [name for n in numbers if (name := mechanism.joint_name(n))]
-
-
-def actuator_on(mechanism: Mechanism, joint: str) -> str | None:
-    """Return the name of the actuator that acts on a joint alone; None without a named one."""
-    for name in mechanism.names("actuator"):
-        if mechanism.joint_of("actuator", name) == joint:
-            return name
-    return None
-
-
-def sensor_on(mechanism: Mechanism, joint: str, measured: str) -> str | None:
-    """Return the name of the sensor of a joint's position, velocity or force; None without one."""
-    for name in mechanism.names("sensor"):
-        if mechanism.joint_of("sensor", name) == joint and mechanism.measures(name) == measured:
-            return name
-    return None
-
-
-def sensor_name(mechanism: Mechanism, joint: str, measured: str) -> str:
-    """Return the name of the implied sensor of a joint's position, velocity or force."""
-    known = sensor_on(mechanism, joint, measured)
-    name = identifier(known) if known else f"{identifier(joint)}_{measured}"
-    # The joint's own component has the joint's name.
-    return f"{name}_{measured}" if name == identifier(joint) else name
-
-
-def actuator_name(mechanism: Mechanism, joint: str) -> str:
-    """Return the name of the implied actuator of a joint."""
-    # MJCF allows a joint, a sensor and an actuator of the same name; components do not.
-    name = identifier(actuator_on(mechanism, joint) or joint)
-    taken = {identifier(joint) for joint in movable_joints(mechanism)}
-    taken |= {identifier(sensor) for sensor in mechanism.names("sensor")}
-    return f"{name}_actuator" if name in taken else name
-
-
-def swinging(mechanism: Mechanism, joints: Sequence[str]) -> list[str]:
-    """Return the joints that swing freely: no actuator acts on them or on joints coupled to them.
-
-    Each has a force actuator of its own, whose command is 0 throughout.
-    """
-    lacking = [joint for joint in joints if actuator_on(mechanism, joint) is None]
-    if len(lacking) < len(joints) and are_coupled(mechanism, joints):
-        return []
-    return lacking
-
-
-def identifier(name: str) -> str:
-    """Return a name of the model as the name of a component: letters, digits and _."""
-    plain = re.sub(r"[^A-Za-z0-9]+", "_", name).strip("_")
-    return plain if re.match(r"[A-Za-z]", plain) else f"n{plain}"
-
-
 def _expand_replay(
     table: Mapping[str, Any], mechanism: Mechanism, implied: Implied, mistakes: Mistakes
 ) -> None:
@@ -243,22 +191,53 @@ def _add_group(
             # Position commands move the joint whatever the load, so its friction cannot be seen.
             tables[identifier(joint)] = {"joint": joint}
     if test == INVERSE:
-        forces = [sensor_name(mechanism, joint, "force") for joint in joints]
-        for joint, name in zip(joints, forces, strict=True):
-            tables[name] = _sensor(mechanism, joint, "force")
-        if len(joints) > 1:
-            for joint, name in zip(joints, forces, strict=True):
-                # Several joints: a short list keeps the number of explanations small enough to tell
-                # apart.
-                tables[identifier(joint)]["effects"] = PRESCRIBED
-                tables[name]["effects"] = PRESCRIBED_FORCE
-                _add_rotor(joint, tables)
-            _add_tendons(mechanism, joints, tables)
-            _add_links(mechanism, joints, tables)
-        else:
-            _add_mass(mechanism, joints[0], tables)
+        forces = _add_forces(joints, mechanism, tables)
         implied.replays.append({**keys, "moved_by": positions, "observe": forces})
         return
+    movers = _add_movers(test, joints, mechanism, tables, free)
+    replay = {**keys, "moved_by": movers, "observe": positions}
+    if test != POSITIONS and len(joints) > 1:
+        replay["free"] = list(joints)
+        _add_free_joints(joints, mechanism, tables, free)
+        for name in movers if test == SERVOS else ():
+            tables[name]["effects"] = FREE_SERVO
+    elif test != POSITIONS:
+        _add_mass(mechanism, joints[0], tables)
+        _add_rotor(joints[0], tables)
+        if test == FORCES and any(mechanism.joint(joints[0]).gravity):
+            # The gravity load depends on the true angle, which makes the encoder's zero observable.
+            tables[positions[0]]["effects"] = ["offset"]
+    implied.replays.append(replay)
+
+
+def _add_forces(
+    joints: Sequence[str], mechanism: Mechanism, tables: dict[str, dict[str, Any]]
+) -> list[str]:
+    """Add the components of joints that move as measured; return the names of the force sensors."""
+    forces = [sensor_name(mechanism, joint, "force") for joint in joints]
+    for joint, name in zip(joints, forces, strict=True):
+        tables[name] = _sensor(mechanism, joint, "force")
+    if len(joints) == 1:
+        _add_mass(mechanism, joints[0], tables)
+        return forces
+    for joint, name in zip(joints, forces, strict=True):
+        # Several joints: a short list keeps the number of explanations small enough to tell apart.
+        tables[identifier(joint)]["effects"] = PRESCRIBED
+        tables[name]["effects"] = PRESCRIBED_FORCE
+        _add_rotor(joint, tables)
+    _add_tendons(mechanism, joints, tables)
+    _add_links(mechanism, joints, tables)
+    return forces
+
+
+def _add_movers(
+    test: str,
+    joints: Sequence[str],
+    mechanism: Mechanism,
+    tables: dict[str, dict[str, Any]],
+    free: Sequence[str],
+) -> list[str]:
+    """Add the actuators of joints that commands move, and return their names."""
     movers: list[str] = []
     for joint in joints:
         actuator, name = actuator_on(mechanism, joint), actuator_name(mechanism, joint)
@@ -268,23 +247,21 @@ def _add_group(
         elif joint in free:
             tables[name] = {"joint": joint, "type": MOVERS[test], "effects": []}
             movers.append(name)
-    replay = {**keys, "moved_by": movers, "observe": positions}
-    if test in (SERVOS, FORCES) and len(joints) == 1:
-        _add_mass(mechanism, joints[0], tables)
-        _add_rotor(joints[0], tables)
-        if test == FORCES and any(mechanism.joint(joints[0]).gravity):
-            # The gravity load depends on the true angle, which makes the encoder's zero observable.
-            tables[positions[0]]["effects"] = ["offset"]
-    elif test in (SERVOS, FORCES):
-        replay["free"] = list(joints)
-        for joint in joints:
-            tables[identifier(joint)]["effects"] = FREE
-        for name in movers if test == SERVOS else ():
-            tables[name]["effects"] = FREE_SERVO
-        # Without a force from an actuator, only ratios of friction and masses to one of the masses
-        # can be seen. One known force is enough, since coupled joints pass it on.
-        _add_links(mechanism, joints[1:] if free else joints, tables)
-    implied.replays.append(replay)
+    return movers
+
+
+def _add_free_joints(
+    joints: Sequence[str],
+    mechanism: Mechanism,
+    tables: dict[str, dict[str, Any]],
+    free: Sequence[str],
+) -> None:
+    """Add the effects and links of coupled joints whose motion follows from forces."""
+    for joint in joints:
+        tables[identifier(joint)]["effects"] = FREE
+    # Without a force from an actuator, only ratios of friction and masses to one of the masses can
+    # be seen. One known force is enough, since coupled joints pass it on.
+    _add_links(mechanism, joints[1:] if free else joints, tables)
 
 
 def _sensor(mechanism: Mechanism, joint: str, measured: str) -> dict[str, Any]:
@@ -307,6 +284,8 @@ def _add_tendons(
 def _add_rotor(joint: str, tables: dict[str, dict[str, Any]]) -> None:
     """Add the rotor that turns with a joint: data sheets of robots seldom state its inertia."""
     name = f"{identifier(joint)}_rotor"
+    # A joint or a body of the model may have that name already.
+    name = f"{name}_inertia" if name in tables else name
     tables[name] = {"joint": joint, "type": "rotor", "effects": ["armature"]}
 
 
@@ -323,22 +302,16 @@ def _add_link(
     mechanism: Mechanism, joint: str, effects: list[str], tables: dict[str, dict[str, Any]]
 ) -> None:
     """Add the rigid body that a joint moves, if it has a name."""
-    body = _body_of(mechanism, joint)
+    body = body_of(mechanism, joint)
     if body:
         name = identifier(body)
         name = f"{name}_body" if name in tables else name
         tables[name] = {"body": body, "type": "body", "effects": effects}
 
 
-def _body_of(mechanism: Mechanism, joint: str) -> str | None:
-    """Return the name of the body that moves with a joint; None for a body without a name."""
-    number = int(mechanism.model.jnt_bodyid[mechanism.number("joint", joint)])
-    return mujoco.mj_id2name(mechanism.model, mujoco.mjtObj.mjOBJ_BODY, number)
-
-
 def _add_mass(mechanism: Mechanism, joint: str, tables: dict[str, dict[str, Any]]) -> None:
     """Add the mass that moves with a joint that is replayed alone."""
-    body = _body_of(mechanism, joint)
+    body = body_of(mechanism, joint)
     # A body with several joints moves with more than this one.
     if body and mechanism.joint_of("body", body) == joint:
         name = identifier(body)

@@ -61,7 +61,7 @@ def runs_backwards(
     model = machine.physics.model(machine, reversed_recording.inputs, configuration, STEPS)
     replayed = measured[:, ::-1]
     backward = _misfits(replayed, model.predict(configuration.plant))
-    # A constant prediction misses the whole swing.
+    # `_misfits` leaves out means, so that a prediction of 0 misses the swing and nothing else.
     whole = _misfits(replayed, np.zeros_like(replayed))
     return (
         bool(np.isfinite(backward).all())

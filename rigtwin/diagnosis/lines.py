@@ -119,14 +119,8 @@ def weigh_lines(
     if propagated is not None:
         # A controller's command has no noise of its own; that of its sensors is propagated.
         floor[[row.kind == "command" for row in machine.rows]] = 0.0
-    noise = floor
-    if limited:
-        # The band limit leaves only the share of white noise within it, and smooths the bits.
-        noise = noise * math.sqrt(min(2.0 * model.band * recording.period, 1.0))
-        resolution = np.zeros_like(resolution)
-    if propagated is not None:
-        noise = np.sqrt(noise**2 + np.var(propagated, axis=1))
-    noise = np.maximum(noise, 1e-300)
+    within = min(2.0 * model.band * recording.period, 1.0)
+    noise = _residual_noise(floor, propagated, within)
     # Noise was filtered before ticks were left out, so none is folded into the band.
     folded = 1.0 / model.every if limited else 1.0
     spread = _noise_variance(
@@ -141,7 +135,8 @@ def weigh_lines(
         fade=fade,
         measured=measured,
         noise=noise,
-        bit=resolution,
+        # The band limit smooths the bits.
+        bit=np.zeros_like(resolution) if limited else resolution,
         length=length,
         period=period,
     )
@@ -191,6 +186,18 @@ def _noise_floors(whole: Array) -> tuple[Array, Array]:
     floor = np.maximum(noise, resolution / np.sqrt(12.0))
     # A signal without visible noise, such as a relay's, is still not known exactly.
     return np.maximum(floor, LEAST_NOISE_SHARE * np.std(whole, axis=1)), resolution
+
+
+def _residual_noise(floor: Array, propagated: Array | None, within: float) -> Array:
+    """Return the noise rms of each signal's residual, shape (rows,).
+
+    `floor` is the noise of the signals, of which the band limit leaves the share `within` of the
+    power. `propagated` is a draw of the noise of the predictions, shape (rows, ticks).
+    """
+    noise = floor * math.sqrt(within)
+    if propagated is not None:
+        noise = np.sqrt(noise**2 + np.var(propagated, axis=1))
+    return np.maximum(noise, 1e-300)
 
 
 def _windows(recording: Recording, model: Model[Any], whole: Array, counted: Array) -> Array:

@@ -276,8 +276,8 @@ def _choose_replacements(
 ) -> list[tuple[tuple[Effect, ...], Values]]:
     """Choose among candidates, the most similar first, those tried in the place of one effect.
 
-    Beside the most similar ones, these are the same kind at other components, and kinds that delay
-    the same signal: the questions that an engineer would ask first.
+    Beside the most similar ones, these are the same kind at other components, and other kinds that
+    delay the same signal or one that resembles it: the questions that an engineer would ask first.
     """
     effect = fit.effects[number]
     starts = []
