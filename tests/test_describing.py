@@ -470,3 +470,11 @@ def test_a_body_named_like_a_rotor_keeps_its_mass(tmp_path: Path):
     machine = rigtwin.describe(tmp_path / "model.xml", tmp_path / "log.csv").machine
     names = {str(effect.name) for effect in machine.effects()}
     assert {"mass@pivot_rotor", "armature@pivot_rotor_inertia"} <= names
+
+
+def test_a_torque_that_cannot_be_read_is_no_free_swing(tmp_path: Path):
+    (tmp_path / "model.xml").write_text(SWING.format(damping=0.001))
+    rows = [f"{0.01 * n:.2f},{math.cos(0.05 * n):.5f},broken" for n in range(300)]
+    (tmp_path / "log.csv").write_text("\n".join(["time,pivot,pivot_torque", *rows]))
+    with pytest.raises(RigtwinError, match="column 'pivot_torque': it holds 'broken' in line 2"):
+        rigtwin.describe(tmp_path / "model.xml", tmp_path / "log.csv")

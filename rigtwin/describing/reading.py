@@ -136,7 +136,7 @@ def _choose_movers(
         # A suggestion by the data is worth more than the general question, which follows where
         # there is none.
         suggest_forces(log, joints, positions, forces)
-        swing = free_swing(log.mechanism, log.slots, joints)
+        swing = free_swing(log.mechanism, log.slots, joints, log.columns.refused)
         if len(log.questions) > before or swing is None:
             if len(log.questions) == before:
                 log.questions.append(str(question))
@@ -171,6 +171,7 @@ def _open(
         questions.append(str(question))
     skipped = [clock.column] if clock is not None else []
     matches, unused = match_columns(mechanism, columns, skipped)
+    unused |= columns.refused
     slots = Slots(columns, matches, corrections)
     log = Log(mechanism, columns, corrections, slots, clock, questions, unused=unused)
     return log, matches

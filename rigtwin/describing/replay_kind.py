@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from rigtwin.describing.heading import read_words, split_words
 from rigtwin.describing.quantity import JointQuantity
 from rigtwin.describing.question import ask, enumerate_names, option
 from rigtwin.describing.slots import Slots
@@ -102,7 +103,9 @@ def choose_kind(
     raise _question(mechanism, joints, measured, commanded)
 
 
-def free_swing(mechanism: Mechanism, slots: Slots, joints: Sequence[str]) -> ReplayKind | None:
+def free_swing(
+    mechanism: Mechanism, slots: Slots, joints: Sequence[str], refused: Mapping[str, str]
+) -> ReplayKind | None:
     """Return the kind of a free swing; None where something may move the joints.
 
     Parameters
@@ -113,12 +116,23 @@ def free_swing(mechanism: Mechanism, slots: Slots, joints: Sequence[str]) -> Rep
         Columns that the log offers.
     joints
         Joints whose position the log holds.
+    refused
+        Column → why it cannot be read as numbers.
+
+    Raises
+    ------
+    RigtwinError
+        If a column is named as a force or a command and cannot be read.
     """
     # A URDF cannot hold actuators, so that their absence says nothing.
     if mechanism.model.nactuator or mechanism.is_urdf:
         return None
     if any(slots.joints(quantity, joints) for quantity in MOVING):
         return None
+    for column, why in refused.items():
+        meaning = read_words(split_words(column), "")
+        if meaning.commanded or meaning.quantity in MOVING:
+            raise RigtwinError(f"column {column!r}: {why}")
     return ReplayKind(FORCES, "the model has no actuator: the joints swing freely")
 
 
