@@ -111,7 +111,8 @@ def test_the_command_prints_the_alarm_and_ends_with_ctrl_c(changed):
     running.send_signal(signal.SIGINT)
     said, complaints = running.communicate(timeout=30.0)
     assert (running.returncode, complaints) == (0, "")
-    assert said.endswith("closing\n")
+    # A further alarm may be reported while the interrupt is on its way.
+    assert "closing" in said.splitlines()
 
 
 def test_a_diagnosis_is_not_of_a_test_that_runs(changed, capsys):

@@ -166,8 +166,8 @@ class LivePage:
             return self.watch, str(error)
 
     def _say(self, line: str) -> None:
-        """Report a message, unless it repeats the last one."""
-        if line != self._last_message:
+        """Report a message, unless it repeats the last one or the page is closed."""
+        if not self._closed and line != self._last_message:
             self._last_message = line
             self._report(line)
 
