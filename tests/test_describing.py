@@ -417,9 +417,9 @@ def test_the_only_column_left_is_the_position_of_the_only_joint(tmp_path: Path):
     force = 2.5 * (-0.2 * 25.0 * np.sin(5.0 * time) - 0.1 * 8.3**2 * np.sin(8.3 * time))
     log = tmp_path / "log.csv"
     table = np.stack([time, force, x], axis=1)
-    np.savetxt(log, table, delimiter=",", header="t,force,x", comments="")
+    np.savetxt(log, table, delimiter=",", header="t,force,w", comments="")
     answer = rigtwin.describe(tmp_path / "cart.xml", log)
-    assert sources(answer)["rail.position"] == "x"
+    assert sources(answer)["rail.position"] == "w"
     assert any("the only column left" in line for line in answer.assumptions)
 
 
@@ -444,7 +444,7 @@ def test_a_held_force_half_a_row_early_is_no_gap(tmp_path: Path, stiffness: floa
         data.ctrl[:] = push
         mujoco.mj_step(model, data, 10)
     log = tmp_path / "log.csv"
-    np.savetxt(log, rows, delimiter=",", header="t,force,x", comments="")
+    np.savetxt(log, rows, delimiter=",", header="t,force,w", comments="")
     diagnosis = rigtwin.diagnose(log, machine=tmp_path / "cart.xml")
     assert [str(effect.name) for effect in diagnosis.effects] == named
     assert diagnosis.answer.verdict == ("explained" if named else "no gap")

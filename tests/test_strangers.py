@@ -215,7 +215,6 @@ HIDDEN = [
         {"viscous@rail": 1.0, "gain@drive": 0.9},
     ),
     ("acrobot", damp("shoulder", 0.15), 0, {"viscous@shoulder": 0.15}),
-    ("acrobot", leave, 3, {"delay@motor": 3 * PERIOD}),
     ("acrobot", leave, 0, {}),
     ("point_mass", spring("root_y", 0.4), 0, {"stiffness@y": 0.4}),
     ("point_mass", weaken("t1", 1.15), 0, {"gain@pull_x": 1.15}),

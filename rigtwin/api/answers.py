@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from rigtwin.api.describing import describe, needs_description, record_log
+from rigtwin.api.describing import describe, needs_description, record_logs
 from rigtwin.api.machines import described_machine, machine_of
 from rigtwin.api.recordings import resolve_recording
 from rigtwin.api.twin import Settings, names_of, require_unrecorded, twin_of
@@ -157,8 +157,8 @@ def read_data(
             raise RigtwinError("no recording to diagnose")
         # The first log decides on columns and units; the others must follow it to be comparable.
         described = describe(machine, logs[0], columns=columns, test=test)  # type: ignore[arg-type]
-        recordings = [record_log(described, log) for log in logs]
-        held_out = [record_log(described, log) for log in _as_list(held_out)]
+        recordings = record_logs(described, logs)
+        held_out = record_logs(described, _as_list(held_out))
         machine = described.machine
     elif columns or test:
         raise RigtwinError("columns and test describe a log; expected a model as the machine")

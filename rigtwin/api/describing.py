@@ -52,7 +52,7 @@ def describe(
     -------
     Described
         `machine`, the described machine; `assumptions`, statements that the log does not make;
-        `record(log)`, a log as a recording. `str()` returns the table of the columns and their
+        `record(log)`, a log as a recording; `records(log)`, each test of a log. `str()` returns the table of the columns and their
         meaning.
 
     Raises
@@ -145,14 +145,15 @@ def log_files(log: Log | reader.Recording) -> tuple[Path, ...]:
     return (path,)
 
 
-def record_log(described: Described, log: Log | reader.Recording) -> Recording:
-    """Return a log as a recording of a described machine.
+def record_logs(described: Described, logs: Sequence[Log | reader.Recording]) -> list[Recording]:
+    """Return all tests of logs as recordings of a described machine.
 
     Parameters
     ----------
     described
         Machine with the map of its log.
-    log
-        Log with the same columns.
+    logs
+        Logs with the same columns.
     """
-    return with_machine(described.record(log_files(log)), described.machine)
+    tests = [test for log in logs for test in described.records(log_files(log))]
+    return [with_machine(test, described.machine) for test in tests]

@@ -111,7 +111,7 @@ def read_recordings(
 ) -> tuple[list[rigtwin.Recording], list[rigtwin.Recording]]:
     """Return the recordings to explain and those held out; logs of a model are described first."""
     import rigtwin
-    from rigtwin.api.describing import needs_description, record_log
+    from rigtwin.api.describing import needs_description, record_logs
 
     stated = columns_of(parsed)
     paths, held_out = parsed.recordings, parsed.held_out
@@ -122,7 +122,7 @@ def read_recordings(
         return [load(p, parsed.machine) for p in paths], [load(p, parsed.machine) for p in held_out]
     described = rigtwin.describe(parsed.machine, paths[0], columns=stated, test=parsed.test)
     print(described, file=sys.stderr)
-    return [record_log(described, p) for p in paths], [record_log(described, p) for p in held_out]
+    return record_logs(described, paths), record_logs(described, held_out)
 
 
 def add_workers(parser: argparse.ArgumentParser) -> None:

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from rigtwin.describing.clock import find_clock
+from rigtwin.describing.episodes import episode_column, longest_test
 from rigtwin.describing.matching import ASSUMED
 from rigtwin.describing.reading import Reading, read_log
 from rigtwin.describing.writer import table_rows, write_description, write_map
@@ -19,8 +20,9 @@ from rigtwin.description.machine import Machine
 from rigtwin.description.mechanism import Mechanism
 from rigtwin.errors import RigtwinError
 from rigtwin.files import atomic_write, forbid_overwriting
+from rigtwin.importing.channels import Imported
 from rigtwin.importing.columns import Columns
-from rigtwin.importing.convert import read_channels, read_columns
+from rigtwin.importing.convert import read_columns, read_tests
 from rigtwin.importing.map_file import parse
 from rigtwin.importing.mapping import Map
 from rigtwin.numerics.arrays import Array
@@ -74,13 +76,33 @@ class Described:
         return (*lines, *self.reading.notes)
 
     def record(self, log: Sequence[Path] = ()) -> Recording:
-        """Return a log as a recording of the machine.
+        """Return a log of one test as a recording of the machine.
 
         Parameters
         ----------
         log
             Files of another log with the same columns, joined. Defaults to the log that
             the machine was described from.
+
+        Raises
+        ------
+        RigtwinError
+            If the log lacks a column, holds no numbers where they are needed, or holds several
+            tests.
+        """
+        first, *others = self.records(log)
+        if others:
+            files = " + ".join(path.name for path in tuple(log) or self.log)
+            raise RigtwinError(f"{files}: it holds {1 + len(others)} tests; expected one")
+        return first
+
+    def records(self, log: Sequence[Path] = ()) -> tuple[Recording, ...]:
+        """Return the tests of a log as recordings of the machine.
+
+        Parameters
+        ----------
+        log
+            As for `record`.
 
         Raises
         ------
@@ -92,14 +114,23 @@ class Described:
         # The map resamples as the first log needed it; another log may be even, or uneven, in time.
         if files != self.log:
             wanted, notes = self._resampled(wanted, files)
-        imported = read_channels(files, wanted)
+        return tuple(
+            self._recording(files, number, imported, notes)
+            for number, imported in read_tests(files, wanted).items()
+        )
+
+    def _recording(
+        self, files: Sequence[Path], number: int | None, imported: Imported, notes: tuple[str, ...]
+    ) -> Recording:
+        """A test of a log; number: that of its episode, None for a log of one test."""
         columns: dict[str, dict[str, Array]] = {}
         for (topic, name), values in imported.channels.items():
             columns.setdefault(topic, {})[name] = values
+        suffix = "" if number is None else f" episode {number}"
         return Recording(
-            path=files[0],
+            path=files[0].with_name(f"{files[0].name}{suffix}"),
             machine=self.machine.name,
-            experiment=" ".join(path.stem for path in files),
+            experiment=" ".join(path.stem for path in files) + suffix,
             period=imported.period,
             # Recordings begin at 0 s, and an uneven log was resampled to this grid.
             time=np.arange(len(imported.time)) * imported.period,
@@ -113,7 +144,8 @@ class Described:
         clock = self.reading.clock
         if not clock.column:
             return wanted, ()
-        second = find_clock(read_columns(log), f"{clock.column} [{clock.unit}]")
+        columns = longest_test(read_columns(log))
+        second = find_clock(columns, f"{clock.column} [{clock.unit}]")
         note = f"rows are uneven in time; resampled to {second.resample or 0.0:g} s"
         return replace(wanted, resample=second.resample), (note,) if second.resample else ()
 
@@ -201,16 +233,21 @@ def describe_log(
         If the model or the log cannot be read.
     """
     mechanism = Mechanism(model)
-    columns: Columns = read_columns(log)
+    columns = read_columns(log)
+    episode = episode_column(columns)
     said = " + ".join(path.name for path in log)
     try:
-        reading = read_log(mechanism, columns, stated, test)
+        # One test, as its time rises and its motion is continuous.
+        sample = longest_test(columns)
+        reading = read_log(mechanism, sample, stated, test)
     except RigtwinError as error:
         # A Question stays one: callers tell it from other errors by its type.
         raise type(error)(f"{said}: {error}") from None
+    if episode:
+        reading = _with_tests(reading, columns, episode)
     name = name_machine(model_name(mechanism), model.stem)
     description = write_description(mechanism, reading, name, model.name, said)
-    mapping = write_map(mechanism, columns, reading, name, said)
+    mapping = write_map(mechanism, sample, reading, name, said, episode)
     machine, mistakes = examine_text(description, model)
     if machine is None:
         raise RigtwinError(f"{model}: {mistakes[0]}")
@@ -222,3 +259,13 @@ def describe_log(
         mapping=mapping,
         rows=tuple(table_rows(mechanism, reading)),
     )
+
+
+def _with_tests(reading: Reading, columns: Columns, episode: str) -> Reading:
+    """The conclusions from the longest test of a log, with a note of all tests."""
+    count = len(np.unique(columns.values[episode]))
+    note = (
+        f"{count} tests, numbered by column {episode}; the longest one decided on units and signs"
+    )
+    unused = {name: why for name, why in reading.unused.items() if name != episode}
+    return replace(reading, unused=unused, notes=(*reading.notes, note))

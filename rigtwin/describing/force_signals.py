@@ -137,7 +137,13 @@ def suggest_forces(
     forces
         Forces that are known.
     """
-    lacking = [joint for joint in joints if joint not in forces]
+    # Nothing pushes a joint without an actuator, unless the model, as a URDF, has none at all.
+    lacking = [
+        joint
+        for joint in joints
+        if joint not in forces
+        and (actuator_on(log.mechanism, joint) or not log.mechanism.model.nactuator)
+    ]
     currents = {joint: log.slots.columns(joint, JointQuantity.CURRENT) for joint in lacking}
     offers = {joint: names for joint, names in currents.items() if names}
     # With one joint, any column without a meaning could be its force; with several, the offers

@@ -61,6 +61,8 @@ def split_words(name: str) -> tuple[str, ...]:
     # Spaces about the word: θ1 has the words theta and 1.
     for letter, word in GREEK.items():
         name = name.replace(letter, f" {word} ")
+    # A capital N at the end is the unit: shaker_N has the words shaker, newton.
+    name = re.sub(r"(?<=[_\s(\[])N(?=[)\]]?$)", "newton", name)
     name = re.sub(r"([a-z])([A-Z])", r"\1 \2", name)
     return tuple(re.findall(r"[a-z]+|\d+", name.lower()))
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from rigtwin.describing.heading import split_words
 from rigtwin.describing.quantity import COMMANDED, MEASURED, WORDS, JointQuantity
-from rigtwin.description.joint_elements import movable_joints
+from rigtwin.description.joint_elements import body_of, movable_joints
 from rigtwin.description.mechanism import Mechanism
 
 QUANTITY_WORDS = frozenset().union(*WORDS.values())
@@ -43,9 +44,10 @@ class Alias:
 def list_aliases(mechanism: Mechanism) -> list[Alias]:
     """Return all names that identify a hinge or slide of a model.
 
-    Each name comes in several forms: complete, without words that do not tell joints apart, such as
-    joint, servo, encoder or position, and without those that all joints share, such as the name of
-    the robot.
+    These are the names of the joint, of its actuators and sensors, and of the body that it moves
+    alone. Each name comes in several forms: complete, without words that do not tell joints apart,
+    such as joint, servo, encoder or position, and without those that all joints share, such as the
+    name of the robot.
 
     Parameters
     ----------
@@ -65,17 +67,32 @@ def list_aliases(mechanism: Mechanism) -> list[Alias]:
         shared = frozenset.intersection(*(frozenset(split_words(joint)) for joint in joints))
     aliases: dict[tuple[str, tuple[str, ...]], Alias] = {}
     for joint, name, quantity in named:
-        if joint not in joints:
-            continue
-        words = split_words(name)
-        telling = tuple(word for word in words if word not in QUANTITY_WORDS | MEASURED | COMMANDED)
-        plain = tuple(word for word in telling if word not in shared)
-        for form in (words, _identifying(telling), _identifying(plain)):
-            if form:
-                # The joint's own name comes first in the list, so an equal name of its sensor adds
-                # nothing.
-                aliases.setdefault((joint, form), Alias(joint, form, quantity, name))
+        for form in _forms(name, shared) if joint in joints else ():
+            # The joint's own name comes first in the list, so an equal name of its sensor adds
+            # nothing.
+            aliases.setdefault((joint, form), Alias(joint, form, quantity, name))
+    # A body can have the name of another joint, such as the elbow's housing on the shoulder.
+    taken = {form for _, form in aliases}
+    for joint, body in _bodies(mechanism, joints).items():
+        for form in _forms(body, shared):
+            if form not in taken:
+                aliases.setdefault((joint, form), Alias(joint, form, None, f"body {body}"))
     return list(aliases.values())
+
+
+def _forms(name: str, shared: frozenset[str]) -> list[tuple[str, ...]]:
+    """Forms of a name, as words; shared: words that all joints have in common."""
+    words = split_words(name)
+    telling = tuple(word for word in words if word not in QUANTITY_WORDS | MEASURED | COMMANDED)
+    plain = tuple(word for word in telling if word not in shared)
+    return [form for form in (words, _identifying(telling), _identifying(plain)) if form]
+
+
+def _bodies(mechanism: Mechanism, joints: Sequence[str]) -> dict[str, str]:
+    """Joint → body that it moves alone, such as the cart on its slide."""
+    bodies = {joint: body_of(mechanism, joint) for joint in joints}
+    moved = list(bodies.values())
+    return {joint: body for joint, body in bodies.items() if body and moved.count(body) == 1}
 
 
 def _identifying(words: tuple[str, ...]) -> tuple[str, ...]:

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rigtwin.describing.heading import read_words, split_words
+from rigtwin.describing.heading import read_words, split_words, stated_unit
 from rigtwin.describing.joint_names import QUANTITY_WORDS, Alias, list_aliases
 from rigtwin.describing.quantity import MEASURED, JointQuantity
 from rigtwin.describing.question import enumerate_names
-from rigtwin.description.joint_elements import movable_joints
+from rigtwin.description.joint_elements import actuator_on, movable_joints
 from rigtwin.description.mechanism import Mechanism
 from rigtwin.importing.columns import Columns
+from rigtwin.importing.units import is_unit, unit_of
 from rigtwin.numerics.arrays import Array
 
 NUMBERED = "numbered in the order of the model's joints"
@@ -23,6 +24,10 @@ REMAINING = "the only column left for the model's joint"
 """Reason of a match by elimination."""
 ASSUMED = (NUMBERED, REMAINING)
 """Reasons of matches that are assumptions."""
+COORDINATES = frozenset("xyz")
+"""Names of a position along a line."""
+ANGULAR = frozenset(["theta", "phi", "angle", "angles", "ang", "omega", "rpm"])
+"""Words for quantities of a hinge."""
 UNNAMED = "its name fits no joint"
 """Reason why a column is not used."""
 
@@ -90,7 +95,7 @@ def match_columns(
         # Two numbers could be the joint and something else, such as a sample: no match.
         elif sum(word.isdigit() for word in words) == 1:
             numbered[column] = words
-        elif len(joints) == 1 and (match := _alone(column, words, unit, joints[0])) is not None:
+        elif (match := _by_kind(mechanism, column, words, unit, joints)) is not None:
             matches.append(match)
         else:
             unused[column] = UNNAMED
@@ -172,14 +177,42 @@ def _place(inner: tuple[str, ...], outer: tuple[str, ...]) -> int | None:
     return None
 
 
-def _alone(column: str, words: tuple[str, ...], unit: str, joint: str) -> Match | None:
-    """A quantity without a joint's name, of a model with one joint."""
+def _by_kind(
+    mechanism: Mechanism, column: str, words: tuple[str, ...], unit: str, joints: Sequence[str]
+) -> Match | None:
+    """A quantity without a joint's name, of the only joint that it can belong to."""
     meaning = read_words(words, unit)
     quantity = _commanded(meaning.quantity) if meaning.commanded else meaning.quantity
+    if quantity is None and len(words) == 1 and words[0] in COORDINATES:
+        quantity = JointQuantity.POSITION
+        meaning = replace(meaning, unknown=())
     if quantity is None:
         return None
+    kind, owners = _owners(mechanism, quantity, words, unit, joints)
+    if len(owners) != 1:
+        return None
     rank = 1.0 - 0.1 * len(meaning.unknown)
-    return Match(column, joint, quantity, "the model has one joint", rank)
+    return Match(column, owners[0], quantity, f"the model has one {kind}", rank)
+
+
+def _owners(
+    mechanism: Mechanism,
+    quantity: JointQuantity,
+    words: tuple[str, ...],
+    unit: str,
+    joints: Sequence[str],
+) -> tuple[str, Sequence[str]]:
+    """Joints that a quantity can belong to, and the word for them."""
+    if len(joints) == 1:
+        return "joint", joints
+    if quantity not in (JointQuantity.POSITION, JointQuantity.VELOCITY):
+        return "actuator", [joint for joint in joints if actuator_on(mechanism, joint)]
+    si = unit_of(stated)[0] if is_unit(stated := unit or stated_unit(words)) else ""
+    if si in ("m", "m/s") or words[0] in COORDINATES:
+        return "slide", [joint for joint in joints if not mechanism.turns(joint)]
+    if si in ("rad", "rad/s") or ANGULAR & set(words):
+        return "hinge", [joint for joint in joints if mechanism.turns(joint)]
+    return "joint", joints
 
 
 def _remaining(

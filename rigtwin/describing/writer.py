@@ -126,7 +126,14 @@ def _examples(mechanism: Mechanism, reading: Reading) -> list[str]:
     return lines
 
 
-def write_map(mechanism: Mechanism, columns: Columns, reading: Reading, name: str, log: str) -> str:
+def write_map(
+    mechanism: Mechanism,
+    columns: Columns,
+    reading: Reading,
+    name: str,
+    log: str,
+    episode: str = "",
+) -> str:
     """Return the text of the map of a log.
 
     Parameters
@@ -141,6 +148,8 @@ def write_map(mechanism: Mechanism, columns: Columns, reading: Reading, name: st
         Name of the machine.
     log
         Name of the log, for a comment.
+    episode
+        Column that numbers the tests of the log; empty for a log of one test.
     """
     clock = reading.clock
     lines = [
@@ -159,6 +168,8 @@ def write_map(mechanism: Mechanism, columns: Columns, reading: Reading, name: st
         lines.append(f"period = {clock.period!r}")
     if clock.resample is not None:
         lines.append(f"resample = {clock.resample!r}      # s; the rows are uneven in time")
+    if episode:
+        lines += ["", "[episodes]", f"column = {_quote(episode)}"]
     channels, named = [], {}
     for signal in reading.signals:
         text, used = _source(signal, columns)

@@ -98,9 +98,15 @@ def _answer_standstill(
 
 
 def recording_notes(recordings: Sequence[Recording]) -> tuple[str, ...]:
-    """Return the notes that the reader made of each recording, with its file's name."""
+    """Return the notes that the reader made of recordings, with the names of their files."""
+    names: dict[str, list[str]] = {}
+    for recording in recordings:
+        for note in recording.notes:
+            names.setdefault(note, []).append(recording.path.name)
+    # The tests of one log share their notes.
     return tuple(
-        f"{recording.path.name}: {note}" for recording in recordings for note in recording.notes
+        f"{files[0]}{f' and {len(files) - 1} more' if len(files) > 1 else ''}: {note}"
+        for note, files in names.items()
     )
 
 

@@ -179,18 +179,40 @@ def read_channels(data: Data, wanted: Map, machine: Machine | None = None) -> Im
         If a column, unit or line is wrong, which the message names, or the data hold several
         episodes.
     """
-    label, columns = _label(data), read_columns(data, wanted.selection)
-    episodes = _split(label, columns, wanted)
-    if len(episodes) > 1:
+    tests = read_tests(data, wanted, machine)
+    if len(tests) > 1:
         raise RigtwinError(
-            f"{label} holds {len(episodes)} episodes; name a folder as the output, such as "
+            f"{_label(data)} holds {len(tests)} episodes; name a folder as the output, such as "
             "-o episodes/, for a recording of each, or choose one in the map: "
-            f"[episodes] take = [{episodes[0].number}]"
+            f"[episodes] take = [{next(iter(tests))}]"
         )
-    header = _header(label, columns)
-    units = _units(wanted, machine)
-    imported = make_channels(label, episodes[0].columns if episodes else columns, wanted, units)
-    return replace(imported, report=(*header, *imported.report))
+    return next(iter(tests.values()))
+
+
+def read_tests(
+    data: Data, wanted: Map, machine: Machine | None = None
+) -> dict[int | None, Imported]:
+    """Return the channels of every test in another program's data.
+
+    Parameters
+    ----------
+    data, wanted, machine
+        As for `read_channels`.
+
+    Returns
+    -------
+    dict
+        Number of the episode, or None for data of one test → its channels.
+    """
+    label, columns = _label(data), read_columns(data, wanted.selection)
+    header, units = _header(label, columns), _units(wanted, machine)
+    episodes = _split(label, columns, wanted)
+    tables = {episode.number: episode.columns for episode in episodes} or {None: columns}
+    tests = {}
+    for number, table in tables.items():
+        imported = make_channels(label, table, wanted, units)
+        tests[number] = replace(imported, report=(*header, *imported.report))
+    return tests
 
 
 def _make_folder(folder: Path) -> None:
