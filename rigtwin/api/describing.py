@@ -52,8 +52,8 @@ def describe(
     -------
     Described
         `machine`, the described machine; `assumptions`, statements that the log does not make;
-        `record(log)`, a log as a recording; `records(log)`, each test of a log. `str()` returns the table of the columns and their
-        meaning.
+        `record(log)`, a log as a recording; `records(log)`, each test of a log. `str()` returns the
+        table of the columns and their meaning.
 
     Raises
     ------
