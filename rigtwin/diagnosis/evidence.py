@@ -24,7 +24,7 @@ and have weight 0.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from copy import copy
 from typing import Any
 
@@ -358,31 +358,6 @@ class Evidence:
     def residual(self, plant: Plant) -> Array:
         """Return the whitened residual at a plant, shape (size,)."""
         return self.whiten(self.differences(plant))
-
-    def linearise(self, plant: Plant, current: Array) -> tuple[Callable[[Plant], Array], Array]:
-        """Return a whitened residual for derivatives at a plant.
-
-        Parameters
-        ----------
-        plant
-            Plant at which derivatives are taken.
-        current
-            Whitened residual of this plant, shape (size,).
-
-        Returns
-        -------
-        tuple
-            Function of a plant that differs little, and its value at the plant itself.
-        """
-        faster = [model.linearise(plant) for model in self.models]
-        if all(predict is None for predict in faster):
-            return self.residual, current
-        parts = [fast or model.predict for fast, model in zip(faster, self.models, strict=True)]
-
-        def residual(near: Plant) -> Array:
-            return self.residual_of([predict(near) for predict in parts])
-
-        return residual, residual(plant)
 
     def residual_of(self, predictions: Sequence[Array]) -> Array:
         """Return the whitened residual of given predictions, shape (rows, ticks) per recording."""

@@ -8,7 +8,7 @@ the residual r and the tolerances eliminated (`Space.strengths`), that is (d'r)^
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
@@ -548,23 +548,18 @@ class Fitter:
             cuts = np.cumsum(sizes)[:-1]
             return tuple(tuple(part.tolist()) for part in np.split(vector, cuts))
 
-        def plant_of(vector: Array) -> Plant:
-            return with_values(base, effects, split(vector))
-
-        def linearise(vector: Array, current: Array) -> tuple[Callable[[Array], Array], Array]:
-            residual, there = self.evidence.linearise(plant_of(vector), current)
-            return lambda near: residual(plant_of(near)), there
+        def residual(vector: Array) -> Array:
+            return self.evidence.residual(with_values(base, effects, split(vector)))
 
         # The plant of the result is the nominal one with the effects, even where `base` has its
         # tolerances moved: a finding is about effects alone.
         minimum = minimise(
-            lambda vector: self.evidence.residual(plant_of(vector)),
+            residual,
             space,
             np.concatenate([np.asarray(values, float) for values in start]),
             steps,
             self.bounds(effects),
             self.evidence.expected,
-            linearise,
         )
         values = split(minimum.values)
         return Fit(

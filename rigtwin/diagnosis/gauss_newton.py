@@ -69,7 +69,6 @@ def minimise(
     steps: Array,
     bounds: tuple[Array, Array],
     expected: float,
-    linearise: Callable[[Array, Array], tuple[Callable[[Array], Array], Array]] | None = None,
 ) -> Minimum:
     """Minimise a misfit from one start.
 
@@ -85,9 +84,6 @@ def minimise(
         Lowest and highest values, shape (parameters,) each.
     expected
         Misfit of noise alone.
-    linearise
-        Function of values and of the residual at them that returns a residual for derivatives there
-        and its own value at these values. Defaults to the residual itself.
 
     Returns
     -------
@@ -103,8 +99,7 @@ def minimise(
         factors = widening * shortening
         # Divided by the factors, the columns stay in units of the original steps, and so does the
         # move.
-        near, there = (residual, current) if linearise is None else linearise(values, current)
-        jacobian = take_derivatives(near, values, there, factors * steps, bounds[1]) / factors
+        jacobian = take_derivatives(residual, values, current, factors * steps, bounds[1]) / factors
         # The responses just taken shorten the steps of the next iteration.
         shortening = shorten(jacobian, misfit)
         normal, gradient = space.normal_equations(jacobian, current)

@@ -278,37 +278,15 @@ class CoupledJoints:
                 undisturbed[0] if disturbance is None else disturbance,
                 undisturbed[1] if guide_disturbance is None else guide_disturbance,
             )
-            return self._integrate(plant, self._starts_of(plant), forces, shifts or {})
+            integrate = self._prepare(plant, shifts or {})
+            parts = [
+                integrate(start, *forces, window.first, window.last)
+                for window, start in zip(self._starts.windows, self._starts_of(plant), strict=True)
+            ]
+            return clip_diverged(parts[0] if len(parts) == 1 else np.concatenate(parts, axis=2))
 
         plain = disturbance is None and guide_disturbance is None and not shifts
         return self._last.recall(self._key(plant), compute) if plain else compute()
-
-    def _integrate(
-        self,
-        plant: Plant,
-        starts: Array,
-        forces: tuple[Array, Array],
-        shifts: Mapping[str, Array],
-    ) -> Array:
-        """Simulate all windows from their initial states, shape (3, coordinates, ticks)."""
-        integrate = self._prepare(plant, shifts)
-        parts = [
-            integrate(start, *forces, window.first, window.last)
-            for window, start in zip(self._starts.windows, starts, strict=True)
-        ]
-        return clip_diverged(parts[0] if len(parts) == 1 else np.concatenate(parts, axis=2))
-
-    def move_from(self, plant: Plant, starts: Array) -> Array:
-        """Simulate the joints from stated initial states, shape (3, coordinates, ticks).
-
-        Parameters
-        ----------
-        plant
-            Components of the machine.
-        starts
-            Initial states of the windows, shape (windows, 2, coordinates).
-        """
-        return self._integrate(plant, starts, self._no_force(), {})
 
     # Sensors
 

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -105,20 +105,6 @@ class ForwardDynamicsModel(CoupledJoints, Model[Plant]):
     def predict(self, plant: Plant) -> Array:
         predicted = self._sense(plant, self.move(plant))
         return self._starts.correct(plant, self._key(plant), self._sense_from(plant), predicted)
-
-    def linearise(self, plant: Plant) -> Callable[[Plant], Array] | None:
-        if self._starts.linear or not any(w.state.fitted for w in self._starts.windows):
-            return None
-        # Fitting the initial states takes several integrations for each plant; to first order they
-        # take one, with derivatives that are taken once.
-        found = self._starts_of(plant)
-        starts = self._starts.linearise(plant, found, self._sense_from(plant))
-
-        def predict(near: Plant) -> Array:
-            moved = self.move(plant) if near == plant else self.move_from(near, starts.of(near))
-            return starts.correct(self._sense(near, moved))
-
-        return predict
 
     def predict_disturbed(self, plant: Plant, entry: str, amount: Array) -> Array:
         disturbance, guide_disturbance = self._no_force()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -77,13 +77,6 @@ class IndependentModel(Model[Plant]):
                 for n, part in zip(rows, parts, strict=True)
             ]
         )
-
-    def linearise(self, plant: Plant) -> Callable[[Plant], Array] | None:
-        faster = [each.linearise(plant) for each in self._joints]
-        if all(each is None for each in faster):
-            return None
-        parts = [each or joint.predict for each, joint in zip(faster, self._joints, strict=True)]
-        return lambda near: np.concatenate([predict(near) for predict in parts])
 
     def halve_steps(self) -> IndependentModel:
         return IndependentModel([each.halve_steps() for each in self._joints])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from copy import copy
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -261,48 +260,6 @@ class InitialState:
             return predicted
         return predicted + self._judged.responses @ self._solve(predicted, moved)
 
-    def linearise(self, plant: Plant, start: Array, sense: Sense) -> tuple[InitialState, Array]:
-        """Return this state with the derivatives at another one, and where that one is.
-
-        Parameters
-        ----------
-        plant
-            Components of the machine.
-        start
-            Initial state found for this plant, shape (2, coordinates).
-        sense
-            Prediction from any initial state.
-
-        Returns
-        -------
-        tuple
-            The initial state, and the distance of `start` from the state as read, in standard
-            errors, shape (unknowns,).
-        """
-        judged = self._judged
-        assert judged is not None
-        whole = sense(start, judged.responses.shape[1])
-        responses = self._respond(start, sense, judged.errors, whole)
-        slopes = responses[list(judged.rows), : judged.ticks].reshape(-1, len(judged.errors))
-        local = copy(self)
-        local._judged = replace(judged, responses=responses, slopes=slopes)
-        return local, (self._free(start) - self._free(self.read(plant))) / judged.errors
-
-    def moved(self, plant: Plant, errors: Array) -> Array:
-        """Return the state at a distance from the state as read, shape (2, coordinates).
-
-        Parameters
-        ----------
-        plant
-            Components of the machine.
-        errors
-            Distance in standard errors, shape (unknowns,).
-        """
-        state, judged = self.read(plant), self._judged
-        if judged is not None:
-            state[:, : self.loose] = (self._free(state) + errors * judged.errors).reshape(2, -1)
-        return state
-
     def move(self, plant: Plant, predicted: Array) -> tuple[Array, Array]:
         """Move the state as read by its errors, to first order.
 
@@ -319,10 +276,13 @@ class InitialState:
             The moved state, shape (2, coordinates), and by how many standard errors, shape
             (unknowns,).
         """
-        errors = np.zeros(2 * self.loose)
-        if self._judged is not None:
-            errors = self._solve(predicted, errors)
-        return self.moved(plant, errors), errors
+        state = self.read(plant)
+        if self._judged is None:
+            return state, np.zeros(2 * self.loose)
+        errors = self._solve(predicted, np.zeros(2 * self.loose))
+        moved = self._free(state) + errors * self._judged.errors
+        state[:, : self.loose] = moved.reshape(2, -1)
+        return state, errors
 
     def _solve(self, predicted: Array, moved: Array) -> Array:
         """Return the errors of the initial state, in standard errors, shape (unknowns,).

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
@@ -55,14 +55,6 @@ class Model(ABC, Generic[P]):
     @abstractmethod
     def predict(self, plant: P) -> Array:
         """Return the signals without noise, shape (rows, ticks)."""
-
-    def linearise(self, plant: P) -> Callable[[P], Array] | None:
-        """Return a faster `predict` for plants that differ little from one plant.
-
-        It serves for derivatives, whose small differences it keeps consistent. None where it would
-        not be faster than `predict`.
-        """
-        return None
 
     @abstractmethod
     def predict_true(self, plant: P) -> Array:

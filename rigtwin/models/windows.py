@@ -10,7 +10,7 @@ techniques for ODE, in: Numerical Treatment of Inverse Problems (1983) 95].
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -80,32 +80,6 @@ def divide(
     middle = (first + last) // 2
     halves = ((first, middle), (middle, last))
     return tuple(part for half in halves for part in divide(*half, period, judge))
-
-
-@dataclass(frozen=True)
-class LocalStarts:
-    """Initial states of plants that differ little from one plant, as linear nuisance parameters.
-
-    Parameters
-    ----------
-    parts
-        Windows with the derivatives at the initial states of that plant, and the distances of those
-        states from the states as read, in standard errors, shape (unknowns,).
-    """
-
-    parts: tuple[tuple[Window, Array], ...]
-
-    def of(self, plant: Plant) -> Array:
-        """Return the states that a prediction starts from, shape (windows, 2, coordinates)."""
-        return np.stack([window.state.moved(plant, errors) for window, errors in self.parts])
-
-    def correct(self, predicted: Array) -> Array:
-        """Correct a prediction from these states to first order, shape (rows, ticks)."""
-        corrected = predicted.copy()
-        for window, errors in self.parts:
-            part = slice(window.first, window.last)
-            corrected[:, part] = window.state.correct(predicted[:, part], errors)
-        return corrected
 
 
 class WindowStarts:
@@ -182,31 +156,6 @@ class WindowStarts:
             part = slice(window.first, window.last)
             corrected[:, part] = window.state.correct(predicted[:, part], errors)
         return corrected
-
-    def linearise(self, plant: Plant, states: Array, sense: Sense) -> LocalStarts:
-        """Return the initial states of plants that differ little from one plant.
-
-        Parameters
-        ----------
-        plant
-            Components of the machine.
-        states
-            Initial states found for this plant, shape (windows, 2, coordinates).
-        sense
-            Prediction of this plant from any initial state.
-        """
-        parts = []
-        for window, start in zip(self.windows, states, strict=True):
-            if not window.state.fitted:
-                parts.append((window, np.zeros(2 * window.state.loose)))
-                continue
-
-            def local(start: Array, ticks: int, first: int = window.first) -> Array:
-                return sense(start, first, first + ticks)
-
-            state, errors = window.state.linearise(plant, start, local)
-            parts.append((replace(window, state=state), errors))
-        return LocalStarts(tuple(parts))
 
     def _read(self, plant: Plant) -> Array:
         """Return the initial states as read, shape (windows, 2, coordinates)."""
