@@ -64,6 +64,16 @@ def test_a_diagnosis_takes_all_episodes_of_a_log(tmp_path: Path):
     assert note.strip().startswith("note: log.csv episode 0 and 2 more: ")
 
 
+def test_a_second_log_may_hold_one_test_or_several(tmp_path: Path):
+    columns = episodes()
+    several = write_log(tmp_path / "several.csv", columns)
+    rest = {name: values[: LENGTHS[0]] for name, values in columns.items()}
+    one = write_log(tmp_path / "one.csv", {n: v for n, v in rest.items() if n != "episode_index"})
+    model = write_arm(tmp_path)
+    assert len(rigtwin.describe(model, several).records([one])) == 1
+    assert len(rigtwin.describe(model, one).records([several])) == len(LENGTHS)
+
+
 @pytest.mark.parametrize(
     ("name", "values", "counts"),
     [
@@ -105,6 +115,17 @@ def test_columns_that_only_one_joint_can_own_are_matched(tmp_path: Path, names: 
         "hinge.position": names[2],
         "slider.command": names[0],
     }
+
+
+def test_a_coordinate_is_no_angle(tmp_path: Path):
+    time = PERIOD * np.arange(500)
+    model = CARTPOLE.replace('type="slide" axis="1 0 0"', 'axis="0 1 0"')
+    model = model.replace('<joint name="hinge" axis="0 1 0"/>', "")
+    (tmp_path / "model.xml").write_text(model)
+    columns = {"t": time, "torque": np.cos(time), "angle": np.sin(time), "x": np.sin(2.0 * time)}
+    answer = rigtwin.describe(tmp_path / "model.xml", write_log(tmp_path / "log.csv", columns))
+    assert {s.key: s.source for s in answer.reading.signals}["slider.position"] == "angle"
+    assert "x" in answer.reading.unused
 
 
 def test_a_unit_in_newtons_is_no_position(tmp_path: Path):

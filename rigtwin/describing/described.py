@@ -111,9 +111,8 @@ class Described:
         """
         files = tuple(log) or self.log
         wanted, notes = parse(self.mapping, "map"), self.assumptions
-        # The map resamples as the first log needed it; another log may be even, or uneven, in time.
         if files != self.log:
-            wanted, notes = self._resampled(wanted, files)
+            wanted, notes = self._adapt(wanted, files)
         return tuple(
             self._recording(files, number, imported, notes)
             for number, imported in read_tests(files, wanted).items()
@@ -128,7 +127,7 @@ class Described:
             columns.setdefault(topic, {})[name] = values
         suffix = "" if number is None else f" episode {number}"
         return Recording(
-            path=files[0].with_name(f"{files[0].name}{suffix}"),
+            path=Path(f"{files[0]}{suffix}"),
             machine=self.machine.name,
             experiment=" ".join(path.stem for path in files) + suffix,
             period=imported.period,
@@ -139,13 +138,16 @@ class Described:
             notes=notes,
         )
 
-    def _resampled(self, wanted: Map, log: Sequence[Path]) -> tuple[Map, tuple[str, ...]]:
-        """The map for another log, whose rows can be uneven in time; and a note if they are."""
-        clock = self.reading.clock
+    def _adapt(self, wanted: Map, log: Sequence[Path]) -> tuple[Map, tuple[str, ...]]:
+        """The map for another log, and a note if its rows are uneven in time.
+
+        That log may be even or uneven in time, and hold one test or several.
+        """
+        columns, clock = read_columns(log), self.reading.clock
+        wanted = replace(wanted, episode=episode_column(columns) or None)
         if not clock.column:
             return wanted, ()
-        columns = longest_test(read_columns(log))
-        second = find_clock(columns, f"{clock.column} [{clock.unit}]")
+        second = find_clock(longest_test(columns), f"{clock.column} [{clock.unit}]")
         note = f"rows are uneven in time; resampled to {second.resample or 0.0:g} s"
         return replace(wanted, resample=second.resample), (note,) if second.resample else ()
 

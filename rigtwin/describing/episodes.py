@@ -5,27 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from rigtwin.describing.heading import split_words
+from rigtwin.describing.quantity import COUNTING, TESTS
 from rigtwin.importing.columns import Columns
 from rigtwin.importing.episodes import split_episodes
 from rigtwin.numerics.arrays import Array
 
-NAMES = frozenset(
-    [
-        "episode",
-        "ep",
-        "run",
-        "trial",
-        "rollout",
-        "traj",
-        "trajectory",
-        "repetition",
-        "rep",
-        "experiment",
-    ]
-)
-"""Words that name the number of a test."""
-COUNTING = frozenset(["index", "idx", "id", "number", "nr", "no", "num"])
-"""Words that may stand beside them."""
 SHORTEST = 20
 """Rows of a test; a column that changes more often counts something else."""
 
@@ -40,7 +24,12 @@ def episode_column(columns: Columns) -> str:
     """
     if columns.episode:
         return columns.episode
-    named = [name for name, values in columns.values.items() if _is_named(name) and _counts(values)]
+    # A column of another length, such as a table of settings, says nothing of the rows.
+    named = [
+        name
+        for name, values in columns.values.items()
+        if _is_named(name) and len(values) == columns.rows and _counts(values)
+    ]
     return named[0] if len(named) == 1 else ""
 
 
@@ -71,7 +60,7 @@ def longest_test(columns: Columns) -> Columns:
 
 def _is_named(column: str) -> bool:
     words = set(split_words(column))
-    return bool(words & NAMES) and words <= NAMES | COUNTING
+    return bool(words & TESTS) and words <= TESTS | COUNTING
 
 
 def _counts(values: Array) -> bool:

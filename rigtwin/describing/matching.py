@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from rigtwin.describing.heading import read_words, split_words, stated_unit
 from rigtwin.describing.joint_names import QUANTITY_WORDS, Alias, list_aliases
-from rigtwin.describing.quantity import MEASURED, JointQuantity
+from rigtwin.describing.quantity import ANGULAR, COORDINATES, MEASURED, JointQuantity
 from rigtwin.describing.question import enumerate_names
 from rigtwin.description.joint_elements import actuator_on, movable_joints
 from rigtwin.description.mechanism import Mechanism
@@ -24,10 +24,6 @@ REMAINING = "the only column left for the model's joint"
 """Reason of a match by elimination."""
 ASSUMED = (NUMBERED, REMAINING)
 """Reasons of matches that are assumptions."""
-COORDINATES = frozenset("xyz")
-"""Names of a position along a line."""
-ANGULAR = frozenset(["theta", "phi", "angle", "angles", "ang", "omega", "rpm"])
-"""Words for quantities of a hinge."""
 UNNAMED = "its name fits no joint"
 """Reason why a column is not used."""
 
@@ -183,15 +179,17 @@ def _by_kind(
     """A quantity without a joint's name, of the only joint that it can belong to."""
     meaning = read_words(words, unit)
     quantity = _commanded(meaning.quantity) if meaning.commanded else meaning.quantity
-    if quantity is None and len(words) == 1 and words[0] in COORDINATES:
-        quantity = JointQuantity.POSITION
-        meaning = replace(meaning, unknown=())
-    if quantity is None:
+    rank = 1.0 - 0.1 * len(meaning.unknown)
+    if quantity is not None:
+        kind, owners = _owners(mechanism, quantity, words, unit, joints)
+    elif len(words) == 1 and words[0] in COORDINATES:
+        # Of "position" and "x", the first one says more clearly what it is.
+        quantity, rank = JointQuantity.POSITION, 0.6
+        kind, owners = "slide", [joint for joint in joints if not mechanism.turns(joint)]
+    else:
         return None
-    kind, owners = _owners(mechanism, quantity, words, unit, joints)
     if len(owners) != 1:
         return None
-    rank = 1.0 - 0.1 * len(meaning.unknown)
     return Match(column, owners[0], quantity, f"the model has one {kind}", rank)
 
 
@@ -208,7 +206,7 @@ def _owners(
     if quantity not in (JointQuantity.POSITION, JointQuantity.VELOCITY):
         return "actuator", [joint for joint in joints if actuator_on(mechanism, joint)]
     si = unit_of(stated)[0] if is_unit(stated := unit or stated_unit(words)) else ""
-    if si in ("m", "m/s") or words[0] in COORDINATES:
+    if si in ("m", "m/s"):
         return "slide", [joint for joint in joints if not mechanism.turns(joint)]
     if si in ("rad", "rad/s") or ANGULAR & set(words):
         return "hinge", [joint for joint in joints if mechanism.turns(joint)]

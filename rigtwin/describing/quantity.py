@@ -76,6 +76,14 @@ UNIT_WORDS = {
     "rps": "rev/s",
 }
 """Word in a column's name → unit that it states."""
+COORDINATES = _words("x y z")
+"""Names of a position along a line."""
+ANGULAR = _words("theta phi angle angles ang omega rpm")
+"""Words for quantities of a hinge."""
+TESTS = _words("episode ep run trial rollout traj trajectory repetition rep experiment")
+"""Words that name the number of a test."""
+COUNTING = _words("index idx id number nr no num")
+"""Words that may stand beside them."""
 TIME = _words("t time timestamp timestamps stamp clock elapsed seconds secs sec")
 """Words that name the time."""
 TIME_UNITS = {

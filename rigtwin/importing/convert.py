@@ -203,6 +203,11 @@ def read_tests(
     -------
     dict
         Number of the episode, or None for data of one test → its channels.
+
+    Raises
+    ------
+    RigtwinError
+        If a column, unit or line is wrong, which the message names.
     """
     label, columns = _label(data), read_columns(data, wanted.selection)
     header, units = _header(label, columns), _units(wanted, machine)
