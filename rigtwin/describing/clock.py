@@ -129,8 +129,8 @@ def _find_column(columns: Columns) -> str:
         row = int(np.argmax(steps < 0.0)) + 2
         raise RigtwinError(
             f"time column {falling[0]!r} goes back in row {row}; several runs in one file? "
-            "expected one run, or a column such as 'episode' that numbers them, with a whole number "
-            "in each row"
+            "expected one run, or a column such as 'episode' that numbers them, with a whole "
+            "number in each row"
         )
     raise ask(
         "no column is named as the time; which is it, or what is the period of the rows in s",
