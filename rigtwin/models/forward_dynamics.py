@@ -58,33 +58,42 @@ class ForwardDynamicsModel(CoupledJoints, Model[Plant]):
 
     def thin(self, longest: float) -> ForwardDynamicsModel:
         """Return a coarser model for a search: fewer ticks and longer integration steps, as long
-        as they change next to nothing, and errors of the start taken as linear."""
-        plant = self._configuration.plant
-        exact = self.predict(plant)
-        allowed = THINNED * np.std(exact, axis=1)
+        as they change next to nothing, and errors of the start taken as linear.
+
+        Linear errors absorb another part of a wrong model's residual than fitted states do, so both
+        grids are compared with linear errors. For the right model, both are small and agree.
+        """
+        plant, linear = self._configuration.plant, self._starts.may_be_linear
+        exact = self._coarsen(1, self._steps, linear) if linear else self
+        predicted = exact.predict(plant)
+        allowed = THINNED * np.std(predicted, axis=1)
         if len(self._starts.windows) > 1:
             # Where small errors grow, what the model lacks moves the fitted states more than that.
             # Both shrink together in the course of a search.
             observed = np.stack([self._signals.column(*row.channel) for row in self.rows])
-            allowed = np.maximum(allowed, UNSTABLE * np.std(exact - observed, axis=1))
-        quick = self._starts.may_be_linear
+            allowed = np.maximum(allowed, UNSTABLE * np.std(predicted - observed, axis=1))
         for every, steps in self._list_grids(longest):
-            if (every, steps, quick) == (1, self._steps, False):
+            if (every, steps) == (1, self._steps):
                 break
-            coarser = ForwardDynamicsModel(
-                self._machine,
-                self._replay,
-                _average_commands(self._signals, every),
-                self._configuration,
-                steps,
-                every,
-                quick,
-                cuts=self.cuts,
-            )
-            change = coarser.predict(plant) - exact[:, ::every]
+            coarser = self._coarsen(every, steps, linear)
+            change = coarser.predict(plant) - predicted[:, ::every]
             if bool(np.all(np.sqrt(np.mean(change**2, axis=1)) <= allowed)):
                 return coarser
-        return self
+        return exact
+
+    def _coarsen(self, every: int, steps: int, linear: bool) -> ForwardDynamicsModel:
+        return ForwardDynamicsModel(
+            self._machine,
+            self._replay,
+            _average_commands(self._signals, every),
+            self._configuration,
+            steps,
+            every,
+            linear,
+            # The ticks of another grid divide the recording at the same times.
+            self._starts.windows if every == 1 else None,
+            self.cuts,
+        )
 
     def _list_grids(self, longest: float) -> Iterator[tuple[int, int]]:
         """Yield ticks that make one, and integration steps per such tick, the cheapest first."""

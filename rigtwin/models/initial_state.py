@@ -348,7 +348,7 @@ class InitialState:
             predicted = judged.measured.ravel() + residual.ravel()
             if share < 1.0:
                 slopes = find_slopes(predict, state, share * judged.errors, predicted) / share
-            state = fit_start(
+            state, predicted = fit_start(
                 predict,
                 judged.measured.ravel(),
                 first,
@@ -360,7 +360,7 @@ class InitialState:
             )
             if np.all(rms <= CLOSE * judged.held):
                 break
-            residual = predict(state).reshape(judged.measured.shape) - judged.measured
+            residual = predicted.reshape(judged.measured.shape) - judged.measured
             after = np.sqrt(np.mean(residual**2, axis=1))
             share = float(np.max(after / np.maximum(rms, judged.held)))
             # Only a residual that falls much is one of the state, whose derivatives were too rough.

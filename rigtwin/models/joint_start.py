@@ -160,7 +160,7 @@ class JointStart:
             # A wrong model must not be blamed on the initial state: its residual widens the
             # tolerance. Not so for a free oscillation, whose whole motion comes from its start.
             held = max(held, float(np.sqrt(np.mean((predicted - measured) ** 2))))
-        state = fit_start(predict, measured, first, error, held, slopes, predicted)
+        state, _ = fit_start(predict, measured, first, error, held, slopes, predicted)
         return float(state[0]), float(state[1])
 
     def _predict_by(self, move: Move, ticks: int) -> Callable[[Array], Array]:

@@ -128,7 +128,7 @@ def fit_start(
     slopes: Array,
     predicted_begun: Array,
     begun: Array | None = None,
-) -> Array:
+) -> tuple[Array, Array]:
     """Fit the initial state to the measured signals by damped Gauss-Newton steps.
 
     With θ the state's change in standard errors, it minimises
@@ -156,12 +156,10 @@ def fit_start(
 
     Returns
     -------
-    array
-        Positions and velocities, shape (unknowns,).
+    tuple of arrays
+        Positions and velocities, shape (unknowns,), and the prediction from them, shape (n,).
     """
-    columns = (slopes.T / tolerance).T
-    # The state is known well enough beforehand that one set of derivatives serves for all steps.
-    normal = columns.T @ columns + np.eye(len(first)) / LIKELY**2
+    columns, prior = (slopes.T / tolerance).T, np.eye(len(first)) / LIKELY**2
 
     def weigh(predicted: Array, moved: Array) -> tuple[Array, float]:
         """Return residual and cost of a prediction at `moved` standard errors from `first`."""
@@ -169,17 +167,35 @@ def fit_start(
         return residual, float(residual @ residual + moved @ moved / LIKELY**2)
 
     moved = np.zeros(len(first)) if begun is None else (begun - first) / error
-    residual, cost = weigh(predicted_begun, moved)
+    predicted = predicted_begun
+    residual, cost = weigh(predicted, moved)
     for _ in range(STEPS):
-        step, before = np.linalg.solve(normal, columns.T @ residual - moved / LIKELY**2), cost
+        pull = columns.T @ residual - moved / LIKELY**2
+        step = np.linalg.solve(columns.T @ columns + prior, pull)
+        # The linear model's decrease of the cost tells without a prediction that the fit ends.
+        if float(pull @ step) <= ENOUGH * cost:
+            break
+        before = cost
         for share in SHARES:
             # Where a joint sticks or swings over, the derivatives may mislead: accept a step only
             # if it lowers the cost.
             tried = moved + share * step
-            tried_residual, tried_cost = weigh(predict(first + error * tried), tried)
+            tried_predicted = predict(first + error * tried)
+            tried_residual, tried_cost = weigh(tried_predicted, tried)
+            columns = _correct(columns, tried - moved, residual - tried_residual)
             if tried_cost < cost:
-                moved, residual, cost = tried, tried_residual, tried_cost
+                moved, predicted = tried, tried_predicted
+                residual, cost = tried_residual, tried_cost
                 break
         if before - cost <= ENOUGH * before:
             break
-    return first + error * moved
+    return first + error * moved, predicted
+
+
+def _correct(columns: Array, step: Array, change: Array) -> Array:
+    """Return derivatives that agree with the change of a step, otherwise as they were.
+
+    This is Broyden's first update [Mathematics of Computation 19 (1965) 577]: without a further
+    prediction, it replaces derivatives that were taken at another state or for another machine.
+    """
+    return columns + np.outer(change - columns @ step, step / float(step @ step))
