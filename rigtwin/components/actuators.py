@@ -22,7 +22,7 @@ class ForceActuator(NamedTuple):
     """
 
     # Static law and limits, read from the MJCF: force = constant · conditioned command.
-    constant: Annotated[float, Quantity("N/unit of the command", 1e-9, 1e9, MJCF)] = 1.0
+    constant: Annotated[float, Quantity("N/unit of the command", -1e9, 1e9, MJCF)] = 1.0
     force_limit: Annotated[float, Quantity("N", 1e-9, UNLIMITED, MJCF)] = UNLIMITED
     command_low: Annotated[
         float, Quantity("unit of the command", -UNLIMITED, UNLIMITED, MJCF)

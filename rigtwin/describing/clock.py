@@ -18,6 +18,9 @@ from rigtwin.numerics.arrays import Array
 SLOWEST, FASTEST = 0.15, 1e-4
 """s; steps of a log of a machine's motion are taken to lie between."""
 UNITS = ("s", "ms", "us", "ns")
+FEWEST, UNEVEN = 50, 0.5
+"""Rows of a column without a telling name, and largest deviation of a step from the median, that
+make it the time."""
 
 
 @dataclass(frozen=True)
@@ -107,8 +110,9 @@ def _find_column(columns: Columns) -> str:
     for column, values in columns.values.items():
         words = split_words(column)
         telling = [word for word in words if word not in TIME_UNITS or word in TIME]
-        # "joint_s" has a unit of time for a word, but does not say that it is one.
-        if telling and set(words) & TIME:
+        # "joint_s" has a unit of time for a word, but does not say that it is one; "ms" does.
+        alone = len(words) == 1 and words[0] in TIME_UNITS
+        if (telling and set(words) & TIME) or alone:
             if _rises(values):
                 # The fewest words win: "time" before "time_of_day".
                 named.append((len(telling), column))
@@ -132,6 +136,9 @@ def _find_column(columns: Columns) -> str:
             "expected one run, or a column such as 'episode' that numbers them, with a whole "
             "number in each row"
         )
+    even = [column for column, values in columns.values.items() if _rises_evenly(values)]
+    if len(even) == 1:
+        return even[0]
     raise ask(
         "no column is named as the time; which is it, or what is the period of the rows in s",
         option("time", "COLUMN"),
@@ -142,6 +149,15 @@ def _find_column(columns: Columns) -> str:
 def _rises(values: Array) -> bool:
     known = values[np.isfinite(values)]
     return len(known) > 2 and bool(np.all(np.diff(known) >= 0.0)) and known[-1] > known[0]
+
+
+def _rises_evenly(values: Array) -> bool:
+    """Whether a column rises as a time does, and does not number the rows."""
+    if not np.isfinite(values).all() or len(values) < FEWEST:
+        return False
+    steps = np.diff(values)
+    step = float(np.median(steps))
+    return step > 0.0 and step != 1.0 and bool(np.all(np.abs(steps - step) < UNEVEN * step))
 
 
 def _steps(column: str, values: Array) -> float:

@@ -6,8 +6,9 @@ from collections.abc import Sequence
 
 from rigtwin.describing.log import STATED, Log
 from rigtwin.describing.quantity import JointQuantity
-from rigtwin.describing.question import Question, ask, enumerate_names, option
+from rigtwin.describing.question import Question, UnitQuestion, ask, enumerate_names, option
 from rigtwin.describing.signal import LogSignal
+from rigtwin.describing.unit_by_force import unit_by_force
 from rigtwin.describing.units import Unit, position_units
 from rigtwin.description.joint_elements import movable_joints
 from rigtwin.errors import RigtwinError
@@ -82,6 +83,12 @@ def _units(log: Log, columns: dict[str, str]) -> dict[str, Unit] | None:
         return dict.fromkeys(columns, Unit(general))
     try:
         return position_units(log.mechanism, log.columns, columns)
+    except UnitQuestion as question:
+        unit = unit_by_force(log, columns, question.units)
+        if unit is not None:
+            return dict.fromkeys(columns, unit)
+        log.questions.append(str(question))
+        return None
     except Question as question:
         log.questions.append(str(question))
         return None

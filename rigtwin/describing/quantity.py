@@ -84,7 +84,7 @@ TESTS = _words("episode ep run trial rollout traj trajectory repetition rep expe
 """Words that name the number of a test."""
 COUNTING = _words("index idx id number nr no num")
 """Words that may stand beside them."""
-TIME = _words("t time timestamp timestamps stamp clock elapsed seconds secs sec")
+TIME = _words("t time timespan timestamp timestamps stamp clock elapsed seconds secs sec")
 """Words that name the time."""
 TIME_UNITS = {
     "s": "s",

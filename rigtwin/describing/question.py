@@ -14,6 +14,22 @@ class Question(RigtwinError):
     """
 
 
+class UnitQuestion(Question):
+    """The unit of the joints' positions is open, and other signals may tell it.
+
+    Parameters
+    ----------
+    question
+        Message with the options that answer it.
+    units
+        Units that are possible.
+    """
+
+    def __init__(self, question: Question, *units: str) -> None:
+        super().__init__(str(question))
+        self.units = units
+
+
 def ask(problem: str, *answers: str) -> Question:
     """Return the question about a problem.
 

@@ -7,12 +7,17 @@ from collections.abc import Sequence
 import numpy as np
 
 from rigtwin.describing.corrections import Corrections, Slot, Stated
+from rigtwin.describing.heading import split_words, stated_unit
 from rigtwin.describing.matching import Match
 from rigtwin.describing.quantity import SI, JointQuantity
 from rigtwin.describing.question import ask, enumerate_names, option
 from rigtwin.importing.columns import Columns
 from rigtwin.importing.units import is_unit, unit_of
+from rigtwin.numerics.arrays import Array
 
+PROPORTIONAL = 1e-5
+"""Largest deviation of two columns from a common shape, as a share of the largest value: rounding
+in a file with six digits."""
 TIE = 0.05
 """Ranks of matches that differ by less do not decide between two columns."""
 
@@ -73,6 +78,10 @@ class Slots:
         # Equal columns make no difference. NaN counts as equal: gaps of both are alike.
         if all(np.array_equal(values[0], candidate, equal_nan=True) for candidate in values[1:]):
             return offers[0]
+        if all(_are_proportional(values[0], candidate) for candidate in values[1:]):
+            stated = [each for each in offers if stated_unit(split_words(each.column))]
+            if len(stated) == 1:
+                return stated[0]
         names = [candidate.column for candidate in offers]
         key = f"{joint}.{quantity.value}"
         raise ask(
@@ -89,3 +98,14 @@ class Slots:
         return (
             is_unit(unit) and unit_of(unit)[0] in SI.get(quantity, ()) and unit_of(unit)[1] == 1.0
         )
+
+
+def _are_proportional(first: Array, second: Array) -> bool:
+    """Whether two columns hold one signal in two units."""
+    known = np.isfinite(first) & np.isfinite(second)
+    one, other = first[known], second[known]
+    power = float(one @ one)
+    if power == 0.0:
+        return False
+    deviation = other - one * (float(one @ other) / power)
+    return bool(np.max(np.abs(deviation)) <= PROPORTIONAL * np.max(np.abs(other)))

@@ -11,7 +11,7 @@ import numpy as np
 
 from rigtwin.describing.heading import split_words, stated_unit
 from rigtwin.describing.quantity import SI, JointQuantity
-from rigtwin.describing.question import ask, option
+from rigtwin.describing.question import UnitQuestion, ask, option
 from rigtwin.description.mechanism import Mechanism
 from rigtwin.importing.columns import Columns
 from rigtwin.importing.units import is_unit, unit_of
@@ -105,8 +105,10 @@ def position_units(
 
     Raises
     ------
+    UnitQuestion
+        If two units are possible, which other signals may tell apart.
     Question
-        If two units are possible, or none.
+        If no unit is possible.
     """
     units: dict[str, Unit] = {}
     # Hinges and slides apart: one log can be in rad and mm.
@@ -195,12 +197,14 @@ def _common_unit(
     reach = f"column {column!r} reaches from {worst[beyond][0]:.4g} to {worst[beyond][1]:.4g}"
     if outside is not None:
         column, (low, high) = positions[outside], worst[outside]
-        raise ask(
+        question = ask(
             f"column {column!r} reaches from {low:.4g} to {high:.4g}, which is beyond the range of "
             f"joint {outside} in {si} and in {small}; is it counted at the motor, behind a gear?",
             option(f"{outside}.position", f"{column} / 32"),
             answers[1],
         )
+        # A shaft without a range may turn on and on.
+        raise question if _limited(mechanism, outside) else UnitQuestion(question, si, small)
     if percent:
         raise ask(
             f"{reach}; is it degrees, or a share of the joint's range in percent?",
@@ -210,9 +214,13 @@ def _common_unit(
     # The turn, or the metres, that such a joint is held to are an assumption: near it, the owner is
     # asked.
     if turns and not _limited(mechanism, beyond) and largest < SURELY_DEGREES:
-        raise ask(f"{reach}, and joint {beyond} has no range; are these rad or degrees?", *answers)
+        question = ask(
+            f"{reach}, and joint {beyond} has no range; are these rad or degrees?", *answers
+        )
+        raise UnitQuestion(question, si, small)
     if not turns and not _limited(mechanism, beyond) and largest < SURELY_MILLIMETRES:
-        raise ask(f"{reach}, and joint {beyond} has no range; are these m or mm?", *answers)
+        question = ask(f"{reach}, and joint {beyond} has no range; are these m or mm?", *answers)
+        raise UnitQuestion(question, si, small)
     return Unit(small, f"{small} by its range, as {beyond} cannot be there in {si}")
 
 

@@ -367,10 +367,11 @@ class Components:
             component = component._replace(**self._mechanism.rest_position(mjcf))
         elif kind == "force actuator":
             constant, limit = self._mechanism.force_per_command(mjcf)
-            if not constant > 0.0:
+            # Below zero, a positive command pushes towards negative positions.
+            if constant == 0.0:
                 self.mistakes.note(
                     where,
-                    f"actuator {mjcf!r} has gear times gain {constant:g}; expected more than 0",
+                    f"actuator {mjcf!r} has gear times gain 0; expected another number",
                 )
                 return None
             component = component._replace(constant=constant, force_limit=min(limit, UNLIMITED))

@@ -136,7 +136,7 @@ def _reach(machine: Machine, mover: Component, joint: Joint) -> Reach:
     if mover.component_type is not ForceActuator:
         return _range(joint)
     constant = component_of(machine.plant, mover.name, ForceActuator).constant
-    return 0.0, _gentle_force(joint) / constant
+    return 0.0, _gentle_force(joint) / abs(constant)
 
 
 def _gentle_force(joint: Joint) -> float:

@@ -25,6 +25,8 @@ from rigtwin.numerics.compiling import fwd_position, fwd_velocity, kernel
 
 UNCHANGED = 1e-9
 """Relative variation below which inertia matrix and bias count as constant."""
+LEAST = 1e-12
+"""Smallest mass, kg, and moment of inertia, kg m², of a body: MuJoCo refuses 1e-15 and less."""
 PLACES = 5
 """Random states at which that is tested."""
 
@@ -223,6 +225,7 @@ class Multibody:
 
         def alter(spec: mujoco.MjSpec) -> None:
             for name, (mass, mx, my, mz, *moments) in parameters.items():
+                mass = max(mass, LEAST)
                 body, centre = spec.body(name), np.array([mx, my, mz]) / mass
                 # MuJoCo wants principal moments about the centre of mass: parallel axes, then
                 # eigenvalues, with axes that form a right-handed frame.
@@ -234,7 +237,7 @@ class Multibody:
                 body.explicitinertial = True
                 body.mass, body.ipos, body.iquat = mass, centre, turned
                 # Rounding may leave a moment of zero slightly negative, which MuJoCo refuses.
-                body.inertia = np.maximum(principal, 1e-15)
+                body.inertia = np.maximum(principal, LEAST)
                 body.fullinertia = np.full(6, np.nan)
             if gravity is not None:
                 spec.option.gravity = gravity(np.array(spec.option.gravity))

@@ -1,0 +1,96 @@
+"""The unit of positions, by the forces that the model needs for the motion.
+
+An inertia needs 57.3 times the torque for a motion in rad that it needs for the same numbers in
+degrees, and 1000 times the force for metres instead of millimetres. No other error is as large.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from rigtwin.describing.checks import force_slopes
+from rigtwin.describing.log import Log
+from rigtwin.describing.quantity import JointQuantity
+from rigtwin.describing.units import Unit, actuator_constant, force_unit
+from rigtwin.description.joint_elements import actuator_on
+from rigtwin.importing.units import unit_of
+from rigtwin.numerics.arrays import Array
+
+SHOWN = 0.1
+"""Share of a force that the model must explain to count."""
+CLOSE, FAR = 5.0, 8.0
+"""Ratio of measured and required force up to which a unit is right, and from which it is not."""
+FORCES = (JointQuantity.FORCE, JointQuantity.FORCE_COMMAND, JointQuantity.COMMAND)
+"""Quantities that may be the force at a joint, the surest first."""
+
+
+def unit_by_force(log: Log, columns: Mapping[str, str], units: Sequence[str]) -> Unit | None:
+    """Return the unit in which the model needs the forces that the log holds.
+
+    Parameters
+    ----------
+    log
+        The log.
+    columns
+        Joint → column of its position.
+    units
+        Units that are possible.
+
+    Returns
+    -------
+    Unit or None
+        None where the log holds no force, or where the forces do not tell.
+    """
+    forces = _forces(log, list(columns))
+    if log.clock is None or not forces:
+        return None
+    ratios = {}
+    for unit in units:
+        positions = {
+            joint: unit_of(unit)[1] * _filled(log.columns.values[column])
+            for joint, column in columns.items()
+        }
+        slopes = force_slopes(log.mechanism, log.time(), positions, forces)
+        shown = [abs(slope.slope) for slope in slopes.values() if slope.explained > SHOWN]
+        if shown:
+            ratios[unit] = float(np.median(shown))
+    if not ratios:
+        return None
+    misses = {unit: abs(math.log(ratio)) for unit, ratio in ratios.items()}
+    best = min(misses, key=lambda unit: misses[unit])
+    others = [miss for unit, miss in misses.items() if unit != best]
+    if misses[best] > math.log(CLOSE) or any(miss < math.log(FAR) for miss in others):
+        return None
+    return Unit(best, f"{best} by the forces, which are {ratios[best]:.2g} times the model's")
+
+
+def _forces(log: Log, joints: Sequence[str]) -> dict[str, Array]:
+    """Joint → force of the log at it, N or Nm, without joints whose force is unknown."""
+    forces = {}
+    for joint in joints:
+        actuator = actuator_on(log.mechanism, joint)
+        for quantity in FORCES:
+            if not log.slots.columns(joint, quantity):
+                continue
+            column = log.slots.match(joint, quantity).column
+            if quantity is JointQuantity.FORCE:
+                factor = force_unit(log.mechanism, log.columns, column, joint).factor
+            elif actuator is None:
+                continue
+            else:
+                factor = actuator_constant(log.mechanism, actuator)
+            values = factor * _filled(log.columns.values[column])
+            if np.any(values):
+                forces[joint] = values
+            break
+    return forces
+
+
+def _filled(values: Array) -> Array:
+    """Return values with missing cells bridged."""
+    known = np.isfinite(values)
+    rows = np.arange(len(values))
+    return np.interp(rows, rows[known], values[known]) if known.any() else np.zeros(len(values))

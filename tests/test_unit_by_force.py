@@ -1,0 +1,108 @@
+"""Units told by forces, times without a telling name, one signal in two units, closed loops."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import rigtwin
+from rigtwin.components.actuators import ForceActuator
+from rigtwin.components.plant import component_of
+from rigtwin.errors import RigtwinError
+from rigtwin.numerics.arrays import Array
+from tests.helpers.logs import write_log
+
+SHAFT = """<mujoco><compiler angle="radian"/><option gravity="0 0 0"/><worldbody><body name="rotor">
+<joint name="shaft" axis="0 0 1"/>
+<inertial pos="0 0 0" mass="1" diaginertia="0.02 0.02 0.02"/></body></worldbody>
+<actuator><motor name="motor" joint="shaft" gear="{gear}"/></actuator></mujoco>"""
+LOOP = """<mujoco><worldbody>
+<body name="crank"><joint name="a" axis="0 1 0"/><geom size="0.1"/></body>
+<body name="rocker" pos="0.2 0 0"><joint name="b" axis="0 1 0"/><geom size="0.1"/></body>
+</worldbody>
+<equality><connect body1="crank" body2="rocker" anchor="0.1 0 0"/></equality></mujoco>"""
+PERIOD, ROWS, INERTIA = 2e-3, 4000, 0.02
+
+
+def write_shaft(folder: Path, gear: float = 1.0) -> Path:
+    path = folder / "shaft.xml"
+    path.write_text(SHAFT.format(gear=gear))
+    return path
+
+
+def shaft_motion(drift: float = 0.0) -> dict[str, Array]:
+    """Motion of the shaft, turning on and on with `drift` in rad/s, and its torque."""
+    time = PERIOD * np.arange(ROWS)
+    angle = drift * time + 0.4 * np.sin(9.0 * time) + 0.1 * np.sin(31.0 * time)
+    torque = -INERTIA * (0.4 * 81.0 * np.sin(9.0 * time) + 0.1 * 961.0 * np.sin(31.0 * time))
+    return {"time": time, "angle": angle, "torque": torque}
+
+
+@pytest.mark.parametrize(
+    ("unit", "drift"), [("deg", 0.0), ("rad", 3.0), ("deg", 3.0), ("rad", 400.0)]
+)
+def test_forces_tell_rad_from_degrees(tmp_path: Path, unit: str, drift: float):
+    motion = shaft_motion(drift)
+    if unit == "deg":
+        motion["angle"] = np.degrees(motion["angle"])
+    answer = rigtwin.describe(write_shaft(tmp_path), write_log(tmp_path / "log.csv", motion))
+    (position,) = (s for s in answer.reading.signals if s.key == "shaft.position")
+    assert position.unit == unit
+    assert "by the forces, which are 1 times the model's" in position.assumed[0]
+
+
+def test_forces_that_fit_no_unit_leave_the_question(tmp_path: Path):
+    motion = shaft_motion(3.0)
+    # Between both units: a torque in Ncm, or behind an unknown gear.
+    motion["torque"] = motion["torque"] / 8.0
+    with pytest.raises(RigtwinError, match="are these rad or degrees"):
+        rigtwin.describe(write_shaft(tmp_path), write_log(tmp_path / "log.csv", motion))
+
+
+@pytest.mark.parametrize(
+    ("name", "factor", "unit"), [("ms", 1e3, "ms"), ("timespan", 1.0, "s"), ("x0", 1.0, "s")]
+)
+def test_a_column_that_rises_evenly_is_the_time(
+    tmp_path: Path, name: str, factor: float, unit: str
+):
+    motion = shaft_motion()
+    motion = {name: factor * motion.pop("time"), **motion}
+    answer = rigtwin.describe(write_shaft(tmp_path), write_log(tmp_path / "log.csv", motion))
+    assert (answer.reading.clock.column, answer.reading.clock.unit) == (name, unit)
+
+
+def test_a_number_of_the_row_is_no_time(tmp_path: Path):
+    motion = shaft_motion()
+    motion = {"x0": np.arange(float(ROWS)), **motion}
+    del motion["time"]
+    with pytest.raises(RigtwinError, match="no column is named as the time"):
+        rigtwin.describe(write_shaft(tmp_path), write_log(tmp_path / "log.csv", motion))
+
+
+def test_of_one_signal_in_two_units_the_one_with_a_unit_counts(tmp_path: Path):
+    motion = shaft_motion()
+    motion["angle_deg"] = np.degrees(motion["angle"])
+    answer = rigtwin.describe(write_shaft(tmp_path), write_log(tmp_path / "log.csv", motion))
+    (position,) = (s for s in answer.reading.signals if s.key == "shaft.position")
+    assert (position.column, position.unit) == ("angle_deg", "deg")
+
+
+def test_a_motor_may_push_backwards(tmp_path: Path):
+    motion = shaft_motion()
+    command = -motion.pop("torque") / 0.5
+    motion |= {"motor_command": command}
+    answer = rigtwin.describe(write_shaft(tmp_path, -0.5), write_log(tmp_path / "log.csv", motion))
+    (signal,) = (s for s in answer.reading.signals if s.key == "shaft.command")
+    assert signal.sign == 1.0
+    assert "confirmed by inverse dynamics (1 times" in signal.checked
+    assert component_of(answer.machine.plant, "motor", ForceActuator).constant == -0.5
+
+
+def test_a_closed_loop_is_refused(tmp_path: Path):
+    path = tmp_path / "loop.xml"
+    path.write_text(LOOP)
+    log = write_log(tmp_path / "log.csv", shaft_motion())
+    with pytest.raises(RigtwinError, match="connect equality of bodies crank and rocker closes"):
+        rigtwin.describe(path, log)
