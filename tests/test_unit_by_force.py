@@ -89,6 +89,20 @@ def test_of_one_signal_in_two_units_the_one_with_a_unit_counts(tmp_path: Path):
     assert (position.column, position.unit) == ("angle_deg", "deg")
 
 
+@pytest.mark.parametrize("unit", ["rad", "deg"])
+def test_an_angle_that_jumps_by_a_turn_is_unwrapped(tmp_path: Path, unit: str):
+    motion = shaft_motion(3.0)
+    true = motion["angle"]
+    turns = (true + np.pi) % (2.0 * np.pi) - np.pi
+    columns = {"time": motion["time"], f"angle_{unit}": turns, "torque": motion["torque"]}
+    if unit == "deg":
+        columns["angle_deg"] = np.degrees(turns)
+    answer = rigtwin.describe(write_shaft(tmp_path), write_log(tmp_path / "log.csv", columns))
+    recorded = answer.record().column("/sensor", "shaft_position")
+    assert recorded == pytest.approx(true, abs=1e-6)
+    assert any("so it is unwrapped" in note for note in answer.assumptions)
+
+
 def test_a_motor_may_push_backwards(tmp_path: Path):
     motion = shaft_motion()
     command = -motion.pop("torque") / 0.5

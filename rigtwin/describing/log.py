@@ -15,6 +15,7 @@ from rigtwin.describing.slots import Slots
 from rigtwin.description.mechanism import Mechanism
 from rigtwin.errors import RigtwinError
 from rigtwin.importing.columns import Columns
+from rigtwin.importing.derived import unwrap
 from rigtwin.importing.units import unit_of
 from rigtwin.numerics.arrays import Array
 
@@ -80,7 +81,10 @@ class Log:
                 factor = unit_of(signal.unit)[1]
             except RigtwinError:
                 factor = 1.0
-            values = factor * self.columns.values[signal.column]
+            values = self.columns.values[signal.column]
+            if signal.wrap is not None:
+                values, _ = unwrap(values, signal.wrap)
+            values = factor * values
         known = np.isfinite(values)
         if not known.all() and known.any():
             rows = np.arange(len(values))

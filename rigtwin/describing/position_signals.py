@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+
+import numpy as np
 
 from rigtwin.describing.log import STATED, Log
 from rigtwin.describing.quantity import JointQuantity
@@ -12,6 +15,10 @@ from rigtwin.describing.unit_by_force import unit_by_force
 from rigtwin.describing.units import Unit, position_units
 from rigtwin.description.joint_elements import movable_joints
 from rigtwin.errors import RigtwinError
+from rigtwin.numerics.arrays import Array
+
+JUMP, WITHIN = 0.8, 1.02
+"""Smallest jump of a wrapped angle, and largest range of its values, in turns."""
 
 
 def ask_positions(log: Log) -> None:
@@ -64,6 +71,12 @@ def position_signals(log: Log, joints: Sequence[str]) -> dict[str, LogSignal] | 
     if units is None or len(signals) + len(matched) < len(joints):
         return None
     for joint, (column, sign, why) in matched.items():
+        wrap = (
+            _wrap(log.columns.values[column], units[joint]) if log.mechanism.turns(joint) else None
+        )
+        assumed = (units[joint].assumed,) if units[joint].assumed else ()
+        if wrap is not None:
+            assumed += (f"it jumps by a turn of {wrap:.4g}, so it is unwrapped",)
         signals[joint] = LogSignal(
             joint=joint,
             quantity=JointQuantity.POSITION,
@@ -72,9 +85,21 @@ def position_signals(log: Log, joints: Sequence[str]) -> dict[str, LogSignal] | 
             unit=units[joint].name,
             sign=sign,
             why=why,
-            assumed=(units[joint].assumed,) if units[joint].assumed else (),
+            assumed=assumed,
+            wrap=wrap,
         )
     return {joint: signals[joint] for joint in joints}
+
+
+def _wrap(values: Array, unit: Unit) -> float | None:
+    """Return the turn by which an angle jumps, in its unit; None of one that does not."""
+    turn = 2.0 * math.pi / unit.factor
+    known = values[np.isfinite(values)]
+    steps = np.abs(np.diff(known))
+    jumps = steps > JUMP * turn
+    # An angle that is wrapped stays within a turn, and moves little between its jumps.
+    wrapped = jumps.any() and np.ptp(known) <= WITHIN * turn
+    return turn if wrapped and np.median(steps) < (1.0 - JUMP) * turn else None
 
 
 def _units(log: Log, columns: dict[str, str]) -> dict[str, Unit] | None:

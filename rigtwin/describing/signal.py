@@ -34,6 +34,8 @@ class LogSignal:
         Factor after conversion to SI, such as that of an actuator's gear.
     checked
         Result of a check against the model; empty without one.
+    wrap
+        Range within which an angle begins again, in the column's unit; None of a continuous signal.
     """
 
     joint: str
@@ -46,6 +48,7 @@ class LogSignal:
     assumed: tuple[str, ...] = ()
     scale: float = 1.0
     checked: str = ""
+    wrap: float | None = None
 
     @property
     def key(self) -> str:

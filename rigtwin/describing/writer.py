@@ -196,6 +196,7 @@ def _source(signal: LogSignal, columns: Columns) -> tuple[str, dict[str, str]]:
     keys = [f"column = {_quote(signal.column)}", f"unit = {_quote(signal.unit)}"]
     keys += ["sign = -1"] if signal.sign < 0.0 else []
     keys += [f"scale = {signal.scale!r}"] if signal.scale != 1.0 else []
+    keys += [f"wrap = {signal.wrap!r}"] if signal.wrap is not None else []
     return f"{{ {', '.join(keys)} }}", {}
 
 
