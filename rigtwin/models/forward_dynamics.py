@@ -60,26 +60,25 @@ class ForwardDynamicsModel(CoupledJoints, Model[Plant]):
         """Return a coarser model for a search: fewer ticks and longer integration steps, as long
         as they change next to nothing, and errors of the start taken as linear.
 
-        Linear errors absorb another part of a wrong model's residual than fitted states do, so both
-        grids are compared with linear errors. For the right model, both are small and agree.
+        Linear errors absorb another part of a wrong model's residual than fitted states do. That
+        alone is no reason against them: for the right model, both are small and agree.
         """
         plant, linear = self._configuration.plant, self._starts.may_be_linear
-        exact = self._coarsen(1, self._steps, linear) if linear else self
-        predicted = exact.predict(plant)
-        allowed = THINNED * np.std(predicted, axis=1)
+        exact = self.predict(plant)
+        allowed = THINNED * np.std(exact, axis=1)
         if len(self._starts.windows) > 1:
             # Where small errors grow, what the model lacks moves the fitted states more than that.
             # Both shrink together in the course of a search.
             observed = np.stack([self._signals.column(*row.channel) for row in self.rows])
-            allowed = np.maximum(allowed, UNSTABLE * np.std(predicted - observed, axis=1))
+            allowed = np.maximum(allowed, UNSTABLE * np.std(exact - observed, axis=1))
         for every, steps in self._list_grids(longest):
             if (every, steps) == (1, self._steps):
                 break
             coarser = self._coarsen(every, steps, linear)
-            change = coarser.predict(plant) - predicted[:, ::every]
+            change = coarser.predict(plant) - exact[:, ::every]
             if bool(np.all(np.sqrt(np.mean(change**2, axis=1)) <= allowed)):
                 return coarser
-        return exact
+        return self._coarsen(1, self._steps, linear) if linear else self
 
     def _coarsen(self, every: int, steps: int, linear: bool) -> ForwardDynamicsModel:
         return ForwardDynamicsModel(
