@@ -63,6 +63,15 @@ def test_the_effect_that_is_there_has_nearly_all_weight(damped):
     assert damped.posterior.closes(damped.posterior.best) > 0.9
 
 
+def test_what_remains_of_each_signals_gap_is_a_share_of_its_amplitude(damped):
+    posterior = damped.posterior
+    whole, best = posterior.remaining(posterior.empty), posterior.remaining(posterior.best)
+    gapped = posterior.excess(posterior.empty) > 0.0
+    assert gapped.any()
+    assert whole[gapped] == pytest.approx(1.0)
+    assert np.all(best[gapped] < 0.2)
+
+
 def test_weights_sum_to_one_and_follow_the_costs(damped):
     ranking = damped.posterior.ranking
     assert sum(each.weight for each in ranking) == pytest.approx(1.0)

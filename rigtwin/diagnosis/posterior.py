@@ -284,6 +284,24 @@ class HypothesisPosterior:
         beyond = np.maximum(self.levels(scored) - 1.0, 0.0)
         return np.asarray(np.sum(scored.samples * beyond, axis=(0, 2)))
 
+    def remaining(self, scored: Scored) -> Array:
+        """Return the share of the amplitude of each signal's gap that a hypothesis leaves.
+
+        Parameters
+        ----------
+        scored
+            Scored hypothesis.
+
+        Returns
+        -------
+        array
+            Shares, shape (signals,): 0 for a signal at noise, infinite for one that only the
+            hypothesis moves away from noise.
+        """
+        before, after = self.excess(self.empty), self.excess(scored)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.where(after > 0.0, np.sqrt(after / before), 0.0)
+
     def closes(self, scored: Scored) -> float:
         """Return the share of the gap's amplitude beyond noise and declared error that a hypothesis
         closes."""

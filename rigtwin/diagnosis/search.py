@@ -18,6 +18,8 @@ import math
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from rigtwin.components import Effect
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.first_look import FirstLook, look_first
@@ -118,6 +120,9 @@ class HypothesisSearch:
         self._searched = tuple(e for e in self.effects if e not in self._later)
         searched = self.evidence.thin()
         self.coarse = Fitter(searched.halve_steps())
+        # Fewer ticks of a prescribed motion change nothing; those of a free one are predicted from
+        # starts whose errors are linear.
+        self._is_approximate = searched is not self.evidence and self._has_free_joint()
         self.fine = Fitter(searched)
         self._scorer = Scorer(self.fine)
         self._extended: set[frozenset[Effect]] = set()
@@ -153,25 +158,25 @@ class HypothesisSearch:
             dry = [fit for fit in singles if fit.effects[0].kind.name == GATEWAY]
             for fit in () if len(self.posterior.best.fit.effects) > 1 else (singles[0], *dry[:1]):
                 fresh = frozenset(fit.effects) not in self._extended
-                if fresh and self.posterior.has_unexplained_residual:
+                if fresh and self._may_gain():
                     self._extend(fit)
             self._climb()
             if not compounds and (
-                self.posterior.has_unexplained_residual
+                self._may_gain()
                 or len(self.posterior.best.fit.effects) > 1
                 or self._has_free_joint()
             ):
                 self._fit_regulars()
                 self._climb()
-            if self.posterior.has_unexplained_residual:
+            if self._may_gain():
                 before = self.posterior.best
                 self._restart()
                 if self._improved(before) or len(before.fit.effects) <= SHORT:
                     self._climb()
-            if self._later and self.posterior.has_unexplained_residual:
+            if self._later and self._may_gain():
                 self._widen()
                 self._climb()
-            if self.posterior.has_unexplained_residual:
+            if self._may_gain():
                 self._reduce_closest()
             self._vary_best()
         return self.posterior
@@ -234,6 +239,18 @@ class HypothesisSearch:
         """
         return self.coarse.evidence.missing_force(self.coarse.plant) is not None
 
+    def _may_gain(self) -> bool:
+        """Return whether one more effect could be worth a fit beside the best hypothesis.
+
+        What an approximate search leaves may be its own error, where it is a small share of every
+        signal's gap.
+        """
+        posterior = self.posterior
+        if not posterior.has_unexplained_residual or not self._is_approximate:
+            return posterior.has_unexplained_residual
+        remaining = float(np.max(posterior.remaining(posterior.best)))
+        return remaining > self.thresholds.negligible_share
+
     def _has_gap(self, singles: Sequence[Fit]) -> bool:
         """Return whether an effect is worth its price, or the residual more than noise."""
         posterior = self.posterior
@@ -286,10 +303,10 @@ class HypothesisSearch:
             if self._improved(before):
                 # The effects that a short hypothesis began with may only resemble the true ones.
                 best = self.posterior.best.fit
-                if 1 < len(best.effects) <= FEW and self.posterior.has_unexplained_residual:
+                if 1 < len(best.effects) <= FEW and self._may_gain():
                     self._vary(best, VARIED)
             else:
-                if not self.posterior.has_unexplained_residual:
+                if not self._may_gain():
                     return
                 # A long hypothesis has many variants: only those of the best one are worth a fit.
                 if leader == before.fit or len(leader.effects) <= SHORT:
@@ -344,7 +361,7 @@ class HypothesisSearch:
             lambda proposal: self.coarse.refine(proposal.effects, proposal.values, proposal.space),
             proposals,
         )
-        if self.posterior.has_unexplained_residual:
+        if self._may_gain():
             fits += self._refine(
                 [
                     *start_in_series(self.coarse, leader, self._searched, self.pool.keys()),

@@ -28,6 +28,9 @@ class Thresholds:
     """Number of hypotheses considered for extension in each round."""
     additions: int = 6
     """Number of further effects fitted beside each leader."""
+    negligible_share: float = 0.02
+    """Share of the amplitude of each signal's gap below which an approximate search looks for no
+    further effect: its own error looks like one."""
 
     # The score of a hypothesis: the price of its effects.
     occam_quiet: float = 15.0
