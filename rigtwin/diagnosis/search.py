@@ -120,9 +120,7 @@ class HypothesisSearch:
         self._searched = tuple(e for e in self.effects if e not in self._later)
         searched = self.evidence.thin()
         self.coarse = Fitter(searched.halve_steps())
-        # Fewer ticks of a prescribed motion change nothing; those of a free one are predicted from
-        # starts whose errors are linear.
-        self._is_approximate = searched is not self.evidence and self._has_free_joint()
+        self._is_approximate = any(model.has_linear_starts for model in searched.models)
         self.fine = Fitter(searched)
         self._scorer = Scorer(self.fine)
         self._extended: set[frozenset[Effect]] = set()

@@ -56,6 +56,10 @@ class ForwardDynamicsModel(CoupledJoints, Model[Plant]):
             self._starts.windows,
         )
 
+    @property
+    def has_linear_starts(self) -> bool:
+        return self._starts.linear
+
     def thin(self, longest: float) -> ForwardDynamicsModel:
         """Return a coarser model for a search: fewer ticks and longer integration steps, as long
         as they change next to nothing, and errors of the start taken as linear.

@@ -113,6 +113,11 @@ class Model(ABC, Generic[P]):
         """Return the model with twice the integration steps, or itself if it integrates nothing."""
         return self
 
+    @property
+    def has_linear_starts(self) -> bool:
+        """Whether predictions are corrected to first order for errors of the initial state."""
+        return False
+
     def thin(self, longest: float) -> Model[Any]:
         """Return a coarser model for a search.
 
