@@ -19,6 +19,7 @@ from rigtwin.description.machine import Machine
 from rigtwin.diagnosis.diagnose import diagnose
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.fitter import Fitter
+from rigtwin.models.multibody import Multibody
 from tests.helpers import arm
 from tests.helpers.arm import MJCF, TOML, described_arm, motion, recording, torques
 from tests.helpers.bodies import arrange_pseudo_inertia
@@ -147,6 +148,16 @@ def test_every_body_within_its_bounds_can_be_made(seed):
     assert np.linalg.eigvalsh(matrix).min() > 0.0
     point = about_frame(1.0, np.array([0.0, 0.0, 1.0]), np.zeros((3, 3)))
     assert point == pytest.approx([1.0, 0.0, 0.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0])
+
+
+@pytest.mark.parametrize("size", [0.0, 1e-15])
+def test_a_body_of_next_to_no_mass_can_be_compiled(tmp_path, size):
+    described_arm(tmp_path)
+    bodies = Multibody(tmp_path / "arm.xml", ["shoulder", "elbow"], [], [])
+    parameters = size * np.array([1.0, 0.0, 0.0, 0.1, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
+    mass, _, inertia = bodies.change({"lower": parameters}, None).list_nominal("lower")
+    assert 0.0 < mass < 1e-9
+    assert np.all(np.linalg.eigvalsh(inertia) > 0.0)
 
 
 def test_a_payload_heavier_than_where_a_search_starts_is_weighed(tmp_path):

@@ -291,6 +291,7 @@ def test_an_impossible_replay_is_refused(tmp_path: Path, replay: str, said: str)
         ),
         ("command_low = nan", "command_low"),
         ('command_high = "wide"', "command_high"),
+        ("constant = 0.0", "constant 0: expected another number"),
     ],
 )
 def test_impossible_command_limits_are_refused(tmp_path: Path, limits: str, said: str) -> None:

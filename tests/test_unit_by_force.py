@@ -73,12 +73,32 @@ def test_a_column_that_rises_evenly_is_the_time(
     assert (answer.reading.clock.column, answer.reading.clock.unit) == (name, unit)
 
 
-def test_a_number_of_the_row_is_no_time(tmp_path: Path):
+@pytest.mark.parametrize("step", [1.0, 10.0])
+@pytest.mark.parametrize("name", ["x0", "position_2"])
+def test_a_number_of_the_row_is_no_time(tmp_path: Path, name: str, step: float):
     motion = shaft_motion()
-    motion = {"x0": np.arange(float(ROWS)), **motion}
+    motion = {name: step * np.arange(float(ROWS)), **motion}
     del motion["time"]
     with pytest.raises(RigtwinError, match="no column is named as the time"):
         rigtwin.describe(write_shaft(tmp_path), write_log(tmp_path / "log.csv", motion))
+
+
+def test_a_time_by_name_comes_before_a_unit_of_time(tmp_path: Path):
+    motion = shaft_motion()
+    motion = {"ms": 1e3 * motion["time"], **motion}
+    answer = rigtwin.describe(write_shaft(tmp_path), write_log(tmp_path / "log.csv", motion))
+    assert answer.reading.clock.column == "time"
+
+
+def test_the_command_of_a_servo_is_no_force(tmp_path: Path):
+    path = tmp_path / "servo.xml"
+    motor = '<motor name="motor" joint="shaft" gear="1.0"/>'
+    servo = '<position name="motor" joint="shaft" kp="20" kv="1"/>'
+    path.write_text(SHAFT.format(gear=1.0).replace(motor, servo))
+    motion = shaft_motion(3.0)
+    columns = {"time": motion["time"], "angle": motion["angle"], "target": motion["angle"]}
+    with pytest.raises(RigtwinError, match="are these rad or degrees"):
+        rigtwin.describe(path, write_log(tmp_path / "log.csv", columns))
 
 
 def test_of_one_signal_in_two_units_the_one_with_a_unit_counts(tmp_path: Path):
@@ -98,9 +118,19 @@ def test_an_angle_that_jumps_by_a_turn_is_unwrapped(tmp_path: Path, unit: str):
     if unit == "deg":
         columns["angle_deg"] = np.degrees(turns)
     answer = rigtwin.describe(write_shaft(tmp_path), write_log(tmp_path / "log.csv", columns))
-    recorded = answer.record().column("/sensor", "shaft_position")
-    assert recorded == pytest.approx(true, abs=1e-6)
     assert any("so it is unwrapped" in note for note in answer.assumptions)
+    stated = {"shaft.position": f"angle_{unit} [{unit}]"}
+    log = tmp_path / "log.csv"
+    for read in (answer, rigtwin.describe(write_shaft(tmp_path), log, columns=stated)):
+        recorded = read.record().column("/sensor", "shaft_position")
+        assert recorded == pytest.approx(true, abs=1e-6)
+
+
+def test_a_position_without_a_number_is_refused(tmp_path: Path):
+    motion = shaft_motion()
+    motion["angle"] = np.full(ROWS, np.nan)
+    with pytest.raises(RigtwinError, match="column 'angle', the position of joint shaft, holds no"):
+        rigtwin.describe(write_shaft(tmp_path), write_log(tmp_path / "log.csv", motion))
 
 
 def test_a_motor_may_push_backwards(tmp_path: Path):

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigtwin.describing.heading import split_words
-from rigtwin.describing.quantity import TIME, TIME_UNITS
+from rigtwin.describing.quantity import COMMANDED, TIME, TIME_UNITS, WORDS
 from rigtwin.describing.question import ask, enumerate_names, option
 from rigtwin.errors import RigtwinError
 from rigtwin.importing.columns import Columns
@@ -19,8 +19,10 @@ SLOWEST, FASTEST = 0.15, 1e-4
 """s; steps of a log of a machine's motion are taken to lie between."""
 UNITS = ("s", "ms", "us", "ns")
 FEWEST, UNEVEN = 50, 0.5
-"""Rows of a column without a telling name, and largest deviation of a step from the median, that
-make it the time."""
+"""Smallest number of rows, and largest deviation of a step as a share of the median step, of a
+column that is taken as the time although its name does not say so."""
+QUANTITIES = frozenset().union(COMMANDED, *WORDS.values())
+"""Words by which a column names another quantity."""
 
 
 @dataclass(frozen=True)
@@ -76,7 +78,11 @@ def find_clock(columns: Columns, stated: str = "") -> Clock:
         if not 1e-6 <= period <= 10.0:
             raise RigtwinError(f"--column time={stated}: expected a period from 1e-6 to 10 s")
         return Clock("", "s", period, None, "period as stated", False)
-    column, unit = _split(stated) if stated else (_find_column(columns), "")
+    unit, reason = "", ""
+    if stated:
+        column, unit = _split(stated)
+    else:
+        column, reason = _find_column(columns)
     if column not in columns.values:
         raise RigtwinError(
             f"--column time={stated}: no column {column!r}; there are {', '.join(columns.values)}"
@@ -87,6 +93,8 @@ def find_clock(columns: Columns, stated: str = "") -> Clock:
         raise RigtwinError(f"time column {column!r} is not a number in {where}")
     steps = _steps(column, columns.values[column])
     unit, why, assumed = _unit(column, unit, columns, steps)
+    if reason:
+        why, assumed = f"{reason}; {why}", True
     factor = unit_of(unit)[1]
     time = factor * columns.values[column]
     # Rows that repeat a time stamp say nothing of the period.
@@ -105,17 +113,19 @@ def _split(stated: str) -> tuple[str, str]:
     return column.strip(), unit.rstrip("] ").strip() if bracket else ""
 
 
-def _find_column(columns: Columns) -> str:
+def _find_column(columns: Columns) -> tuple[str, str]:
+    """The column of the time, and why it is that one where its name does not say so."""
     named, falling = [], []
     for column, values in columns.values.items():
         words = split_words(column)
         telling = [word for word in words if word not in TIME_UNITS or word in TIME]
-        # "joint_s" has a unit of time for a word, but does not say that it is one; "ms" does.
-        alone = len(words) == 1 and words[0] in TIME_UNITS
+        # "joint_s" has a unit of time for a word, but does not say that it is one; "ms" does, and
+        # "s" may be a distance.
+        alone = len(words) == 1 and words[0] in TIME_UNITS and len(words[0]) > 1
         if (telling and set(words) & TIME) or alone:
             if _rises(values):
-                # The fewest words win: "time" before "time_of_day".
-                named.append((len(telling), column))
+                # The fewest words win: "time" before "time_of_day", and before "ms".
+                named.append((len(telling) or 2, column))
             elif len(words) == len(telling) == 1:
                 falling.append(column)
     named.sort()
@@ -126,7 +136,7 @@ def _find_column(columns: Columns) -> str:
             *(option("time", name) for name in names[:3]),
         )
     if named:
-        return named[0][1]
+        return named[0][1], ""
     steps = np.diff(columns.values[falling[0]]) if falling else np.zeros(0)
     if (steps < 0.0).any():
         # Two: rows count from 1, and the step belongs to the row that it leads to.
@@ -136,9 +146,13 @@ def _find_column(columns: Columns) -> str:
             "expected one run, or a column such as 'episode' that numbers them, with a whole "
             "number in each row"
         )
-    even = [column for column, values in columns.values.items() if _rises_evenly(values)]
+    even = [
+        column
+        for column, values in columns.values.items()
+        if not set(split_words(column)) & QUANTITIES and _rises_evenly(values)
+    ]
     if len(even) == 1:
-        return even[0]
+        return even[0], "no column is named as the time, and this one alone rises evenly"
     raise ask(
         "no column is named as the time; which is it, or what is the period of the rows in s",
         option("time", "COLUMN"),
@@ -152,12 +166,12 @@ def _rises(values: Array) -> bool:
 
 
 def _rises_evenly(values: Array) -> bool:
-    """Whether a column rises as a time does, and does not number the rows."""
-    if not np.isfinite(values).all() or len(values) < FEWEST:
+    """Whether a column rises as a time does, and holds no whole numbers, which may count rows."""
+    if not np.isfinite(values).all() or len(values) < FEWEST or np.all(values == np.round(values)):
         return False
     steps = np.diff(values)
     step = float(np.median(steps))
-    return step > 0.0 and step != 1.0 and bool(np.all(np.abs(steps - step) < UNEVEN * step))
+    return step > 0.0 and bool(np.all(np.abs(steps - step) < UNEVEN * step))
 
 
 def _steps(column: str, values: Array) -> float:

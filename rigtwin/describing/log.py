@@ -23,6 +23,23 @@ STATED = "as stated"
 """Reason of a signal whose source the owner of the log states."""
 
 
+def bridge(values: Array) -> Array:
+    """Return values with missing cells interpolated; a column without any number as it is.
+
+    The checks differentiate and filter, so that one missing cell would spoil the whole column.
+
+    Parameters
+    ----------
+    values
+        Values of a column, NaN where a cell holds no number, shape (rows,).
+    """
+    known = np.isfinite(values)
+    if known.all() or not known.any():
+        return values
+    rows = np.arange(len(values))
+    return np.interp(rows, rows[known], values[known])
+
+
 @dataclass
 class Log:
     """Log that is being read.
@@ -85,12 +102,7 @@ class Log:
             if signal.wrap is not None:
                 values, _ = unwrap(values, signal.wrap)
             values = factor * values
-        known = np.isfinite(values)
-        if not known.all() and known.any():
-            rows = np.arange(len(values))
-            # The checks differentiate and filter: one missing cell would spoil the whole column.
-            values = np.interp(rows, rows[known], values[known])
-        return signal.sign * signal.scale * values
+        return signal.sign * signal.scale * bridge(values)
 
     def stated_signal(self, joint: str, quantity: JointQuantity) -> LogSignal:
         """The signal of a slot whose source the owner of the log states."""

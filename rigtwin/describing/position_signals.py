@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from rigtwin.describing.unit_by_force import unit_by_force
 from rigtwin.describing.units import Unit, position_units
 from rigtwin.description.joint_elements import movable_joints
 from rigtwin.errors import RigtwinError
+from rigtwin.importing.units import unit_of
 from rigtwin.numerics.arrays import Array
 
 JUMP, WITHIN = 0.8, 1.02
@@ -66,17 +68,17 @@ def position_signals(log: Log, joints: Sequence[str]) -> dict[str, LogSignal] | 
                 log.questions.append(str(question))
                 continue
             matched[joint] = match.column, 1.0, match.why
+    for joint, (column, _, _) in matched.items():
+        if not np.isfinite(log.columns.values[column]).any():
+            raise RigtwinError(
+                f"column {column!r}, the position of joint {joint}, holds no number; expected one "
+                "in most rows"
+            )
     # All at once: columns without a unit share one, and the widest range decides it.
     units = _units(log, {joint: column for joint, (column, _, _) in matched.items()})
     if units is None or len(signals) + len(matched) < len(joints):
         return None
     for joint, (column, sign, why) in matched.items():
-        wrap = (
-            _wrap(log.columns.values[column], units[joint]) if log.mechanism.turns(joint) else None
-        )
-        assumed = (units[joint].assumed,) if units[joint].assumed else ()
-        if wrap is not None:
-            assumed += (f"it jumps by a turn of {wrap:.4g}, so it is unwrapped",)
         signals[joint] = LogSignal(
             joint=joint,
             quantity=JointQuantity.POSITION,
@@ -85,15 +87,28 @@ def position_signals(log: Log, joints: Sequence[str]) -> dict[str, LogSignal] | 
             unit=units[joint].name,
             sign=sign,
             why=why,
-            assumed=assumed,
-            wrap=wrap,
+            assumed=(units[joint].assumed,) if units[joint].assumed else (),
         )
-    return {joint: signals[joint] for joint in joints}
+    return {joint: _unwrap(log, signals[joint]) for joint in joints}
 
 
-def _wrap(values: Array, unit: Unit) -> float | None:
-    """Return the turn by which an angle jumps, in its unit; None of one that does not."""
-    turn = 2.0 * math.pi / unit.factor
+def _unwrap(log: Log, signal: LogSignal) -> LogSignal:
+    """Return the signal of an angle that jumps by a turn as one that is to be unwrapped."""
+    if signal.formula or not log.mechanism.turns(signal.joint):
+        return signal
+    wrap = _wrap(log.columns.values[signal.column], unit_of(signal.unit)[1])
+    if wrap is None:
+        return signal
+    text = f"it jumps by a turn of {wrap:.4g}, so it is unwrapped"
+    return replace(signal, wrap=wrap, assumed=(*signal.assumed, text))
+
+
+def _wrap(values: Array, factor: float) -> float | None:
+    """Return the turn by which an angle jumps, in its unit; None of one that does not.
+
+    `factor` converts the unit to rad.
+    """
+    turn = 2.0 * math.pi / factor
     known = values[np.isfinite(values)]
     steps = np.abs(np.diff(known))
     jumps = steps > JUMP * turn
@@ -108,12 +123,10 @@ def _units(log: Log, columns: dict[str, str]) -> dict[str, Unit] | None:
         return dict.fromkeys(columns, Unit(general))
     try:
         return position_units(log.mechanism, log.columns, columns)
-    except UnitQuestion as question:
-        unit = unit_by_force(log, columns, question.units)
-        if unit is not None:
-            return dict.fromkeys(columns, unit)
-        log.questions.append(str(question))
-        return None
     except Question as question:
+        if isinstance(question, UnitQuestion):
+            unit = unit_by_force(log, columns, question.units)
+            if unit is not None:
+                return dict.fromkeys(columns, unit)
         log.questions.append(str(question))
         return None

@@ -12,8 +12,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from rigtwin.describing.checks import force_slopes
-from rigtwin.describing.log import Log
+from rigtwin.describing.log import Log, bridge
 from rigtwin.describing.quantity import JointQuantity
+from rigtwin.describing.question import Question
 from rigtwin.describing.units import Unit, actuator_constant, force_unit
 from rigtwin.description.joint_elements import actuator_on
 from rigtwin.importing.units import unit_of
@@ -22,7 +23,8 @@ from rigtwin.numerics.arrays import Array
 SHOWN = 0.1
 """Share of a force that the model must explain to count."""
 CLOSE, FAR = 5.0, 8.0
-"""Ratio of measured and required force up to which a unit is right, and from which it is not."""
+"""Ratio of measured to required force up to which a unit may be right, and from which it is wrong;
+the same for its inverse."""
 FORCES = (JointQuantity.FORCE, JointQuantity.FORCE_COMMAND, JointQuantity.COMMAND)
 """Quantities that may be the force at a joint, the surest first."""
 
@@ -50,7 +52,7 @@ def unit_by_force(log: Log, columns: Mapping[str, str], units: Sequence[str]) ->
     ratios = {}
     for unit in units:
         positions = {
-            joint: unit_of(unit)[1] * _filled(log.columns.values[column])
+            joint: unit_of(unit)[1] * bridge(log.columns.values[column])
             for joint, column in columns.items()
         }
         slopes = force_slopes(log.mechanism, log.time(), positions, forces)
@@ -69,28 +71,32 @@ def unit_by_force(log: Log, columns: Mapping[str, str], units: Sequence[str]) ->
 
 def _forces(log: Log, joints: Sequence[str]) -> dict[str, Array]:
     """Joint → force of the log at it, N or Nm, without joints whose force is unknown."""
-    forces = {}
-    for joint in joints:
-        actuator = actuator_on(log.mechanism, joint)
-        for quantity in FORCES:
-            if not log.slots.columns(joint, quantity):
-                continue
-            column = log.slots.match(joint, quantity).column
-            if quantity is JointQuantity.FORCE:
-                factor = force_unit(log.mechanism, log.columns, column, joint).factor
-            elif actuator is None:
-                continue
-            else:
-                factor = actuator_constant(log.mechanism, actuator)
-            values = factor * _filled(log.columns.values[column])
-            if np.any(values):
-                forces[joint] = values
-            break
-    return forces
+    forces = {joint: _force(log, joint) for joint in joints}
+    return {joint: force for joint, force in forces.items() if force is not None and np.any(force)}
 
 
-def _filled(values: Array) -> Array:
-    """Return values with missing cells bridged."""
-    known = np.isfinite(values)
-    rows = np.arange(len(values))
-    return np.interp(rows, rows[known], values[known]) if known.any() else np.zeros(len(values))
+def _force(log: Log, joint: str) -> Array | None:
+    """Measured force at a joint, or that of its motor's command; None where neither is known."""
+    motor = actuator_on(log.mechanism, joint)
+    if motor is not None and log.mechanism.positions(motor):
+        motor = None
+    for quantity in FORCES:
+        if quantity is not JointQuantity.FORCE and motor is None:
+            continue
+        if not log.slots.has(joint, quantity):
+            continue
+        if log.slots.stated(joint, quantity) is not None:
+            force = log.values(log.stated_signal(joint, quantity))
+        else:
+            try:
+                column = log.slots.match(joint, quantity).column
+                unit = force_unit(log.mechanism, log.columns, column, joint)
+            except Question:
+                # An open question about the force is asked once the positions are known.
+                return None
+            factor = unit.factor if quantity is JointQuantity.FORCE else 1.0
+            force = factor * bridge(log.columns.values[column])
+        if quantity is JointQuantity.FORCE or motor is None:
+            return force
+        return actuator_constant(log.mechanism, motor) * force
+    return None

@@ -331,6 +331,8 @@ class Components:
                     f"{key} of {element} {mjcf!r} in the MJCF is {value:g}: expected a number "
                     f"from {meaning.low:g} to {meaning.high:g}",
                 )
+        if kind == "force actuator" and component.constant == 0.0:
+            self.mistakes.note(where, "constant 0: expected another number")
         if kind in (*PUSHING, "position actuator"):
             low, high = component.command_low, component.command_high
             if not low < high:

@@ -15,6 +15,7 @@ from rigtwin.description.actuator_law import (
     read_timing,
     rest_position,
 )
+from rigtwin.description.closed_loops import refuse_closed_loops
 from rigtwin.description.machine import Joint
 from rigtwin.description.model_checks import check_text, check_values
 from rigtwin.errors import RigtwinError
@@ -74,8 +75,6 @@ class Tie(NamedTuple):
         return Tie(self.to, self.joint, 1.0 / self.ratio, -self.offset / self.ratio, self.number)
 
 
-LOOPS = {int(mujoco.mjtEq.mjEQ_CONNECT): "connect", int(mujoco.mjtEq.mjEQ_WELD): "weld"}
-"""Equalities that tie two bodies, and so may close a loop of joints."""
 MASSLESS = 1e-6
 """Mass of a URDF link without inertia, kg. MuJoCo refuses moving bodies without mass; the square
 of this number is the inertia, kg m²."""
@@ -111,24 +110,6 @@ def compile_model(
     return spec.compile()
 
 
-def check_loops(path: Path, model: mujoco.MjModel) -> None:
-    """Raise RigtwinError if an active equality closes a loop of moving bodies."""
-    for number in range(model.neq):
-        kind, within = int(model.eq_type[number]), int(model.eq_objtype[number])
-        if kind not in LOOPS or not model.eq_active0[number]:
-            continue
-        ends = [int(model.eq_obj1id[number]), int(model.eq_obj2id[number])]
-        if within == mujoco.mjtObj.mjOBJ_SITE:
-            ends = [int(model.site_bodyid[site]) for site in ends]
-        # Bodies that are welded together move alike, so that nothing is constrained between them.
-        if model.body_weldid[ends[0]] != model.body_weldid[ends[1]]:
-            names = [mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_BODY, end) for end in ends]
-            raise RigtwinError(
-                f"model {path}: the {LOOPS[kind]} equality of bodies {names[0]} and {names[1]} "
-                "closes a loop of joints; expected a tree, such as the same machine without it"
-            )
-
-
 class Mechanism:
     """Compiled MJCF or URDF.
 
@@ -153,7 +134,7 @@ class Mechanism:
             # MuJoCo's messages have several lines; ours have one.
             raise RigtwinError(f"model {path}: {' '.join(str(error).split())}") from None
         check_values(path, self.model)
-        check_loops(path, self.model)
+        refuse_closed_loops(path, self.model)
         try:
             mujoco.mj_forward(self.model, mujoco.MjData(self.model))
         except mujoco.FatalError as error:

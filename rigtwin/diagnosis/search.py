@@ -240,8 +240,8 @@ class HypothesisSearch:
     def _may_gain(self) -> bool:
         """Return whether one more effect could be worth a fit beside the best hypothesis.
 
-        What an approximate search leaves may be its own error, where it is a small share of every
-        signal's gap.
+        A residual that is a small share of every signal's gap may be the error of an approximate
+        search.
         """
         posterior = self.posterior
         if not posterior.has_unexplained_residual or not self._is_approximate:

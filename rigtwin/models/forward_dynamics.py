@@ -61,11 +61,11 @@ class ForwardDynamicsModel(CoupledJoints, Model[Plant]):
         return self._starts.linear
 
     def thin(self, longest: float) -> ForwardDynamicsModel:
-        """Return a coarser model for a search: fewer ticks and longer integration steps, as long
-        as they change next to nothing, and errors of the start taken as linear.
+        """Return a coarser model for a search.
 
-        Linear errors absorb another part of a wrong model's residual than fitted states do. That
-        alone is no reason against them: for the right model, both are small and agree.
+        It has fewer ticks and longer integration steps, if both change next to nothing. Errors of
+        the start are linear in any case: for a wrong model they differ much from fitted states, but
+        for the right one both are small and agree.
         """
         plant, linear = self._configuration.plant, self._starts.may_be_linear
         exact = self.predict(plant)
@@ -85,6 +85,7 @@ class ForwardDynamicsModel(CoupledJoints, Model[Plant]):
         return self._coarsen(1, self._steps, linear) if linear else self
 
     def _coarsen(self, every: int, steps: int, linear: bool) -> ForwardDynamicsModel:
+        """Return the model with one tick in `every`, and `steps` integration steps in each."""
         return ForwardDynamicsModel(
             self._machine,
             self._replay,
@@ -93,7 +94,7 @@ class ForwardDynamicsModel(CoupledJoints, Model[Plant]):
             steps,
             every,
             linear,
-            # The ticks of another grid divide the recording at the same times.
+            # A window holds signals at its own ticks, so other ticks need windows of their own.
             self._starts.windows if every == 1 else None,
             self.cuts,
         )

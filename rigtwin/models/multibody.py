@@ -25,10 +25,10 @@ from rigtwin.numerics.compiling import fwd_position, fwd_velocity, kernel
 
 UNCHANGED = 1e-9
 """Relative variation below which inertia matrix and bias count as constant."""
-LEAST = 1e-12
-"""Smallest mass, kg, and moment of inertia, kg m², of a body: MuJoCo refuses 1e-15 and less."""
 PLACES = 5
 """Random states at which that is tested."""
+LEAST = 1e-12
+"""Smallest mass, kg, and moment of inertia, kg m², of a body: MuJoCo refuses 1e-15 and less."""
 
 
 class Bodies(NamedTuple):

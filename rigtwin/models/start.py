@@ -160,15 +160,9 @@ def fit_start(
         Positions and velocities, shape (unknowns,), and the prediction from them, shape (n,).
     """
     columns, prior = (slopes.T / tolerance).T, np.eye(len(first)) / LIKELY**2
-
-    def weigh(predicted: Array, moved: Array) -> tuple[Array, float]:
-        """Return residual and cost of a prediction at `moved` standard errors from `first`."""
-        residual = (measured - predicted) / tolerance
-        return residual, float(residual @ residual + moved @ moved / LIKELY**2)
-
     moved = np.zeros(len(first)) if begun is None else (begun - first) / error
     predicted = predicted_begun
-    residual, cost = weigh(predicted, moved)
+    residual, cost = _weigh(measured, predicted, tolerance, moved)
     for _ in range(STEPS):
         pull = columns.T @ residual - moved / LIKELY**2
         step = np.linalg.solve(columns.T @ columns + prior, pull)
@@ -181,7 +175,7 @@ def fit_start(
             # if it lowers the cost.
             tried = moved + share * step
             tried_predicted = predict(first + error * tried)
-            tried_residual, tried_cost = weigh(tried_predicted, tried)
+            tried_residual, tried_cost = _weigh(measured, tried_predicted, tolerance, tried)
             columns = _correct(columns, tried - moved, residual - tried_residual)
             if tried_cost < cost:
                 moved, predicted = tried, tried_predicted
@@ -190,6 +184,14 @@ def fit_start(
         if before - cost <= ENOUGH * before:
             break
     return first + error * moved, predicted
+
+
+def _weigh(
+    measured: Array, predicted: Array, tolerance: float | Array, moved: Array
+) -> tuple[Array, float]:
+    """Return weighted residual and cost of a prediction, `moved` standard errors from the first."""
+    residual = (measured - predicted) / tolerance
+    return residual, float(residual @ residual + moved @ moved / LIKELY**2)
 
 
 def _correct(columns: Array, step: Array, change: Array) -> Array:
