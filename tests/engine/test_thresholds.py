@@ -6,7 +6,13 @@ from dataclasses import asdict
 
 from rigtwin.diagnosis.thresholds import STANDARD, Thresholds
 
-SEARCH = {"promising_share": 0.1, "precise_fit_shortfall": 0.2, "leaders": 3, "additions": 6}
+SEARCH = {
+    "promising_share": 0.1,
+    "precise_fit_shortfall": 0.2,
+    "leaders": 3,
+    "additions": 6,
+    "negligible_share": 0.02,
+}
 SCORE = {
     "occam_quiet": 15.0,
     "occam_discrepant": 5.0,
