@@ -42,7 +42,7 @@ test: setup system browser
 	$(BIN)/python -m pytest -n auto --dist loadfile
 
 test-slow: setup system
-	$(BIN)/python -m pytest -n auto -m slow
+	$(BIN)/python -m pytest -n auto --dist loadgroup -m slow
 
 browser:
 	@bash scripts/browser.sh

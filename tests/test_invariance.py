@@ -67,7 +67,8 @@ def crop(recordings: Recordings) -> Recordings:
 
 
 def shift(recordings: Recordings) -> Recordings:
-    return [replace(recording, time=recording.time + 123.0) for recording in recordings]
+    """Shift the time, and reverse the order of the recordings."""
+    return [replace(recording, time=recording.time + 123.0) for recording in recordings[::-1]]
 
 
 def triple(recordings: Recordings) -> Recordings:
@@ -78,18 +79,12 @@ def triple(recordings: Recordings) -> Recordings:
     ]
 
 
-def reverse(recordings: Recordings) -> Recordings:
-    return recordings[::-1]
-
-
 CHANGES: dict[str, Change] = {
-    "noise of 1e-13": add_noise(1e-13),
     "noise of 1e-9": add_noise(1e-9),
     "noise of 1e-6": add_noise(1e-6),
     "cropped": crop,
-    "later": shift,
+    "later and reordered": shift,
     "tripled": triple,
-    "reordered": reverse,
 }
 
 
@@ -131,7 +126,12 @@ CASES: dict[str, Callable[[], tuple[Machine, Recordings]]] = {
 }
 
 
-@pytest.fixture(scope="module", params=CASES, ids=lambda name: name.replace(" ", "-"))
+@pytest.fixture(
+    scope="module",
+    # One worker takes all changes of a case, and so diagnoses the unchanged data once.
+    params=[pytest.param(name, marks=pytest.mark.xdist_group(name)) for name in CASES],
+    ids=lambda name: name.replace(" ", "-"),
+)
 def case(request: pytest.FixtureRequest) -> tuple[Machine, Recordings, Diagnosis]:
     machine, recordings = CASES[request.param]()
     return machine, recordings, diagnose(machine, recordings)
@@ -143,8 +143,6 @@ def test_what_does_not_matter_changes_nothing(
     case: tuple[Machine, Recordings, Diagnosis], change: str
 ) -> None:
     machine, recordings, expected = case
-    if change == "reordered" and len(recordings) == 1:
-        pytest.skip("one recording has no order")
     answer = diagnose(machine, CHANGES[change](recordings)).answer
     assert {str(e.name) for e in answer.effects} == {str(e.name) for e in expected.answer.effects}
     known = {str(effect.name): effect for effect in expected.answer.effects}
