@@ -387,6 +387,7 @@ SWING = """<mujoco><option timestep="0.0005" integrator="RK4"/><worldbody><body 
 <inertial pos="0 0 -0.25" mass="0.5" diaginertia="0.01 0.01 0.001"/></body></worldbody></mujoco>"""
 
 
+@pytest.mark.slow
 def test_joints_of_a_model_without_actuators_swing_freely(tmp_path: Path):
     model = mujoco.MjModel.from_xml_string(SWING.format(damping=0.012))
     data = mujoco.MjData(model)

@@ -206,7 +206,6 @@ def leave(_: mujoco.MjModel) -> None:
 
 
 HIDDEN = [
-    ("cartpole", weaken("slide", 0.9), 0, {"gain@drive": 0.9}),
     ("cartpole", leave, 0, {}),
     (
         "cartpole",

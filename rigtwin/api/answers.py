@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from rigtwin.api.describing import describe, needs_description, record_logs
@@ -17,6 +17,7 @@ from rigtwin.diagnosis.data_checks import require_fit
 from rigtwin.diagnosis.diagnose import diagnose as find_reasons
 from rigtwin.diagnosis.first_look import FirstLook as FirstLook
 from rigtwin.diagnosis.result import Diagnosis
+from rigtwin.diagnosis.thresholds import STANDARD
 from rigtwin.errors import RigtwinError
 from rigtwin.recording import reader
 from rigtwin.simulation.experiment import find_experiment
@@ -41,6 +42,7 @@ def diagnose(
     first_look: Callable[[FirstLook], object] = lambda _: None,
     columns: Mapping[str, str] | None = None,
     test: str = "",
+    effort: float = STANDARD.effort,
 ) -> Diagnosis:
     """Diagnose why recordings of one machine disagree with its twin.
 
@@ -74,6 +76,9 @@ def diagnose(
         effects that may cause it. The diagnosis continues meanwhile.
     columns, test
         Statements about a log as `describe` takes them. They require a model as the machine.
+    effort
+        Processor time after which the search tries no further hypothesis, s. It is estimated from
+        the integration steps, so that the answer does not depend on the computer.
 
     Returns
     -------
@@ -98,6 +103,8 @@ def diagnose(
     >>> [str(effect.name) for effect in diagnosis.effects]  # doctest: +SKIP
     ['viscous@motor']
     """
+    if not effort > 0.0:
+        raise RigtwinError(f"effort must be positive, not {effort:g} s")
     data = read_data(recordings, machine, held_out, columns, test)
     # Excluded effects leave the machine itself, so that no later step can propose them again.
     described = data.machine.excluding(names_of("exclude", exclude))
@@ -111,6 +118,7 @@ def diagnose(
         data.held_out,
         tests,
         progress=progress,
+        thresholds=replace(STANDARD, effort=effort),
         first_look=first_look,
     )
 

@@ -22,6 +22,7 @@ from rigtwin.cli.options import (
     settings_of,
 )
 from rigtwin.console import writable, write_json
+from rigtwin.diagnosis.thresholds import STANDARD
 from rigtwin.errors import RigtwinError
 
 if TYPE_CHECKING:
@@ -101,6 +102,13 @@ def _add_scope(parser: argparse.ArgumentParser) -> None:
         help="effect not to search for, e.g. delay@motor, or delay for every component",
     )
     add_held_out(parser)
+    parser.add_argument(
+        "--effort",
+        type=float,
+        metavar="SECONDS",
+        help="processor time, about, after which no further hypothesis is tried; default "
+        f"{STANDARD.effort:.0f}",
+    )
 
 
 def execute(parsed: argparse.Namespace) -> int:
@@ -133,6 +141,8 @@ def execute(parsed: argparse.Namespace) -> int:
             "progress": progress,
         }
         if parsed.changed:
+            if parsed.effort is not None:
+                raise RigtwinError("--effort: of a diagnosis, not of --changed")
             changes = rigtwin.what_changed(recordings, **options)
             if parsed.json is not None:
                 write_json(parsed.json, changes.document())
@@ -140,6 +150,8 @@ def execute(parsed: argparse.Namespace) -> int:
             bar.close()
             print(changes)
             return 0
+        if parsed.effort is not None:
+            options["effort"] = parsed.effort
         diagnosis = rigtwin.diagnose(recordings, held_out=held_out, first_look=show, **options)
     print("\n".join(_write_files(parsed, diagnosis, reports)))
     return 1 if diagnosis.verdict == "unusable" else 0
@@ -203,10 +215,10 @@ def _diagnose_each(parsed: argparse.Namespace) -> int:
             "--exclude: of one diagnosis; for --each, list the effects of a component in its "
             "description, effects = [...]"
         )
-    if parsed.changed or parsed.held_out or any(alone):
+    if parsed.changed or parsed.held_out or parsed.effort is not None or any(alone):
         raise RigtwinError(
-            "--each keeps its answers in its folder; leave out --held-out, --changed, --json, "
-            "--html, --pdf, --png, --save-twin and --save-mjcf"
+            "--each keeps its answers in its folder; leave out --held-out, --effort, --changed, "
+            "--json, --html, --pdf, --png, --save-twin and --save-mjcf"
         )
     with counting_bar("recording", "diagnose") as progress:
         answers = rigtwin.diagnose_each(

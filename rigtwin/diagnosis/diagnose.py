@@ -267,7 +267,7 @@ def _diagnose_part(
         ),
         next_test=next_test,
         not_observable=list_unobservable(explanation, attributed),
-        notes=tuple(_collect_notes(evidence, judged, readings)),
+        notes=tuple(_collect_notes(evidence, judged, readings, thresholds)),
         recordings=tuple(str(recording.path) for recording in evidence.recordings),
         seconds=time.perf_counter() - started,
         machine=evidence.machine.name,
@@ -346,8 +346,16 @@ def _choose_verdict(
     return "explained" if closes_enough and not has_residual else "partly explained"
 
 
-def _collect_notes(evidence: Evidence, judged: _Judged, readings: SignalReadings) -> list[str]:
+def _collect_notes(
+    evidence: Evidence, judged: _Judged, readings: SignalReadings, thresholds: Thresholds
+) -> list[str]:
+    cut = (
+        f"the search ended after about {thresholds.effort:.0f} s of processor time, before all "
+        f"hypotheses were tried: an effect may be missing, or named in the place of another; "
+        f"--effort {5 * thresholds.effort:.0f} searches longer"
+    )
     return [
+        *([cut] if judged.explanation.ended_early else []),
         *recording_notes(evidence.recordings),
         *_prediction_notes(evidence),
         *_clipping_notes(evidence),

@@ -36,6 +36,7 @@ from rigtwin.components.plant import Plant
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Machine
 from rigtwin.description.tolerance import Tolerance
+from rigtwin.diagnosis.effort import Effort
 from rigtwin.diagnosis.lines import smooth, spectrum_of_noise, weigh_lines
 from rigtwin.diagnosis.spikes import JUMPS, SPIKE, despike
 from rigtwin.models.model import Model
@@ -114,6 +115,8 @@ class Evidence:
         Each recording in the frequency domain.
     expected
         Chi-square of the residual if only noise and declared model error remain.
+    effort
+        Account of what predictions cost; None where nobody counts.
     """
 
     def __init__(
@@ -139,6 +142,7 @@ class Evidence:
         steps
             Upper bound on the integration steps per tick, where a tick is short.
         """
+        self.effort: Effort | None = None
         self._counted = counted or [np.ones(recording.ticks) for recording in recordings]
         self.machine, self.recordings, self.configurations = (
             machine,
@@ -275,6 +279,8 @@ class Evidence:
         list of arrays
             Predicted signals of each recording, shape (rows, ticks).
         """
+        if self.effort is not None:
+            self.effort.add(sum(model.effort for model in self.models))
         return [model.predict(plant) for model in self.models]
 
     def differences(self, plant: Plant) -> list[Array]:

@@ -35,12 +35,15 @@ class Explanation:
         Effects that are not observable on this evidence at any simulated size.
     chain
         Nested fits that lead to the best hypothesis, the fit of a single effect first.
+    ended_early
+        Whether the effort was spent before all hypotheses were tried.
     """
 
     posterior: HypothesisPosterior
     fit: Fit
     unobservable: tuple[Effect, ...]
     chain: tuple[Fit, ...]
+    ended_early: bool
 
 
 def candidates(evidence: Evidence) -> list[Effect]:
@@ -90,13 +93,14 @@ def explain(
         best = posterior.best.fit
         fit = best
         # A search on thinned ticks is followed by one fit to all of them.
-        if best.effects and search.fine.evidence is not evidence:
+        if best.effects and search.fine.evidence.models is not evidence.models:
             fit = Fitter(evidence).refit_with_tolerances(best)
         return Explanation(
             posterior=posterior,
             fit=fit,
             unobservable=_unobservable(search, posterior),
             chain=tuple(_nest(search, fit)),
+            ended_early=search.ended_early,
         )
 
 

@@ -16,11 +16,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Sequence
+from copy import copy
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from rigtwin.components import Effect
+from rigtwin.diagnosis.effort import Effort
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.first_look import FirstLook, look_first
 from rigtwin.diagnosis.fit import Fit
@@ -104,6 +106,8 @@ class HypothesisSearch:
         Fitters on evidence with half and with all integration steps.
     screened
         Screened candidates.
+    ended_early
+        Whether the effort was spent before all hypotheses were tried.
     """
 
     evidence: Evidence
@@ -114,11 +118,14 @@ class HypothesisSearch:
     pool: dict[frozenset[Effect], Scored] = field(default_factory=dict, init=False)
 
     def __post_init__(self) -> None:
+        self._effort = Effort(self.thresholds.effort)
+        self.ended_early = False
         # Where effects compound, every effect costs integrations of all joints.
         staged = self.evidence.machine.physics.compounds
         self._later = tuple(e for e in self.effects if staged and e.kind.name in LATER)
         self._searched = tuple(e for e in self.effects if e not in self._later)
-        searched = self.evidence.thin()
+        searched = copy(self.evidence.thin())
+        searched.effort = self._effort
         self.coarse = Fitter(searched.halve_steps())
         self._is_approximate = any(model.has_linear_starts for model in searched.models)
         self.fine = Fitter(searched)
@@ -244,10 +251,19 @@ class HypothesisSearch:
         search.
         """
         posterior = self.posterior
-        if not posterior.has_unexplained_residual or not self._is_approximate:
-            return posterior.has_unexplained_residual
-        remaining = float(np.max(posterior.remaining(posterior.best)))
-        return remaining > self.thresholds.negligible_share
+        if not posterior.has_unexplained_residual:
+            return False
+        if self._is_approximate:
+            remaining = float(np.max(posterior.remaining(posterior.best)))
+            if remaining <= self.thresholds.negligible_share:
+                return False
+        return not self._is_spent(1.0 - self.thresholds.last_effort_share)
+
+    def _is_spent(self, share: float) -> bool:
+        """Return whether a share of the effort is spent, and note that there was more to try."""
+        spent = self._effort.share > share
+        self.ended_early = self.ended_early or spent
+        return spent
 
     def _has_gap(self, singles: Sequence[Fit]) -> bool:
         """Return whether an effect is worth its price, or the residual more than noise."""
@@ -295,7 +311,8 @@ class HypothesisSearch:
         steady = 0
         while steady < STEADY_ROUNDS:
             before = self.posterior.best
-            if (leader := self._next_leader()) is None:
+            leader = self._next_leader()
+            if leader is None or self._is_spent(1.0 - self.thresholds.last_effort_share):
                 return
             self._extend(leader)
             if self._improved(before):
@@ -406,6 +423,8 @@ class HypothesisSearch:
         varied: set[frozenset[Effect]] = set()
         reduced: set[tuple[Effect, ...]] = set()
         while len(best := self.posterior.best.fit.effects) > 1 and frozenset(best) not in varied:
+            if self._is_spent(1.0):
+                return
             varied.add(frozenset(best))
             reduced.add(best)
             self._vary(self.posterior.best.fit, COMPARED)

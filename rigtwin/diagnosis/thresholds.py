@@ -28,6 +28,10 @@ class Thresholds:
     """Number of hypotheses considered for extension in each round."""
     additions: int = 6
     """Number of further effects fitted beside each leader."""
+    effort: float = 120.0
+    """Estimated processor time after which no further hypothesis is tried, s."""
+    last_effort_share: float = 0.3
+    """Share of `effort` that is kept for rivals of the best hypothesis."""
     negligible_share: float = 0.02
     """Share of the amplitude of each signal's gap below which an approximate search looks for no
     further effect: its own error looks like one."""

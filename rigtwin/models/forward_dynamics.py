@@ -29,6 +29,8 @@ COARSER = 2.0
 may be tried longer than in models without this check."""
 THINNED = 5e-3
 """Largest change of a signal by longer steps in a search, as a share of its standard deviation."""
+STEP_EFFORT = 1.5e-6
+"""Estimated processor time of an integration step for each free coordinate, s."""
 UNSTABLE = 0.3
 """Largest change of a signal by a search's approximations in an unstable machine, as a share of the
 nominal residual."""
@@ -55,6 +57,10 @@ class ForwardDynamicsModel(CoupledJoints, Model[Plant]):
             # How well the start is known hardly depends on the integration steps.
             self._starts.windows,
         )
+
+    @property
+    def effort(self) -> float:
+        return STEP_EFFORT * self._ticks * self._steps * self._loose
 
     @property
     def has_linear_starts(self) -> bool:

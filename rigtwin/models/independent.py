@@ -78,6 +78,10 @@ class IndependentModel(Model[Plant]):
             ]
         )
 
+    @property
+    def effort(self) -> float:
+        return sum(each.effort for each in self._joints)
+
     def halve_steps(self) -> IndependentModel:
         return IndependentModel([each.halve_steps() for each in self._joints])
 

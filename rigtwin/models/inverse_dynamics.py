@@ -45,6 +45,8 @@ STANDING, RESTING = 0.02, 0.1
 """Share of its rms speed below which a joint stands still, and shortest rest, s."""
 REGRESSORS = 40
 """Number of remembered regressors. A search returns to few motions."""
+ROW_EFFORT = 3e-7
+"""Estimated processor time of a tick for each joint, s."""
 DRAWS = 2
 """Number of draws of the motions' noise."""
 Kinematics = Array
@@ -141,6 +143,10 @@ class InverseDynamicsModel(Model[Plant]):
         if every <= self.every:
             return self
         return InverseDynamicsModel(self._machine, self._replay, self._signals, every, self)
+
+    @property
+    def effort(self) -> float:
+        return ROW_EFFORT * len(self._movers) * (self._signals.ticks // self.every)
 
     def _move(self, plant: Plant, shifts: Mapping[str, Array] | None = None) -> Kinematics:
         """Return the joints' motion by the sensors.

@@ -30,6 +30,8 @@ SMALL = 0.02
 """Size of a small disturbance, as a share of the signal's standard deviation."""
 SHORTEST_END = 20
 """Divisor of a recording's length that gives the largest part left out at each end."""
+STEP_EFFORT = 6e-7
+"""Estimated processor time of an integration step, s."""
 SEED = 7
 """Seed of the noise that is propagated through the machine."""
 PLACES = {"position": 0, "velocity": 1, "force": 2, "command": 3}
@@ -90,6 +92,11 @@ class JointModel(Model[Plant]):
             return math.inf
         assert joint.mover.channel is not None
         return motion_band(self._signals.column(*joint.mover.channel), self._period)
+
+    @property
+    def effort(self) -> float:
+        ticks = self._signals.ticks // self.every
+        return STEP_EFFORT * ticks * (self._steps if self._joint.pushed else 1)
 
     def halve_steps(self) -> JointModel:
         return self._on_grid(max(1, self._steps // 2), self.every)

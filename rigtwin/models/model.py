@@ -114,6 +114,15 @@ class Model(ABC, Generic[P]):
         return self
 
     @property
+    def effort(self) -> float:
+        """Estimated processor time of one prediction, s.
+
+        It is counted from the integration steps and not measured, so that a search that ends after
+        a given effort gives the same answer on every computer.
+        """
+        return 0.0
+
+    @property
     def has_linear_starts(self) -> bool:
         """Whether predictions are corrected to first order for errors of the initial state."""
         return False

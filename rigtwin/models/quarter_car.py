@@ -56,6 +56,8 @@ MECHANICAL = (
     "computer",
 )
 """Components that the true motion depends on."""
+STEP_EFFORT = 8e-8
+"""Estimated processor time of an integration step, s."""
 
 
 class Disturbances(NamedTuple):
@@ -123,6 +125,10 @@ class QuarterCarModel(Model[RigPlant]):
             inputs.column("/command", name) for name in ("ground", "structure", "voltage")
         )
         return cls(ground, structure, voltage, configuration, steps)
+
+    @property
+    def effort(self) -> float:
+        return STEP_EFFORT * len(self._voltage) * self._steps
 
     def halve_steps(self) -> QuarterCarModel:
         """Return the model with half the integration steps."""

@@ -11,6 +11,8 @@ SEARCH = {
     "precise_fit_shortfall": 0.2,
     "leaders": 3,
     "additions": 6,
+    "effort": 120.0,
+    "last_effort_share": 0.3,
     "negligible_share": 0.02,
 }
 SCORE = {
