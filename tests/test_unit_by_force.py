@@ -150,3 +150,38 @@ def test_a_closed_loop_is_refused(tmp_path: Path):
     log = write_log(tmp_path / "log.csv", shaft_motion())
     with pytest.raises(RigtwinError, match="connect equality of bodies crank and rocker closes"):
         rigtwin.describe(path, log)
+
+
+@pytest.mark.parametrize(
+    ("unit", "rate"), [("rad", "rpm"), ("deg", "rpm"), ("deg", "rad/s"), ("rad", "deg/s")]
+)
+def test_a_velocity_tells_rad_from_degrees(tmp_path: Path, unit: str, rate: str):
+    motion = shaft_motion(30.0)
+    per_radian = {"rad": 1.0, "deg": 180.0 / np.pi, "rpm": 30.0 / np.pi}
+    speed = np.gradient(motion["angle"], motion["time"])
+    motion["speed"] = per_radian[rate.removesuffix("/s")] * speed
+    motion["angle"] = per_radian[unit] * motion["angle"]
+    answer = rigtwin.describe(write_shaft(tmp_path), write_log(tmp_path / "log.csv", motion))
+    (position,) = (s for s in answer.reading.signals if s.key == "shaft.position")
+    assert position.unit == unit
+    assert position.assumed[0] == f"{unit} by 'speed', which is its rate in {rate}"
+
+
+def test_a_torque_before_the_gear_is_asked_about_and_tells_the_unit(tmp_path: Path):
+    gear, gravity = 30.0, 2.0
+    path = tmp_path / "arm.xml"
+    path.write_text(
+        SHAFT.format(gear=gear)
+        .replace('gravity="0 0 0"', 'gravity="0 0 -9.81"')
+        .replace('axis="0 0 1"', 'axis="0 1 0"')
+        .replace('pos="0 0 0" mass="1"', f'pos="0 0 {-gravity / 9.81}" mass="1"')
+    )
+    motion = shaft_motion(3.0)
+    inertia = INERTIA + (gravity / 9.81) ** 2
+    motion["torque"] *= inertia / INERTIA
+    motion["torque"] += gravity * np.sin(motion["angle"])
+    motion["motor_torque"] = motion.pop("torque") / gear
+    with pytest.raises(RigtwinError, match="before a gear") as raised:
+        rigtwin.describe(path, write_log(tmp_path / "log.csv", motion))
+    assert "rad by the forces, of which the model explains" in str(raised.value)
+    assert 'shaft.force=30 * motor_torque"' in str(raised.value)

@@ -16,6 +16,8 @@ from rigtwin.describing.units import Unit, actuator_constant, force_unit
 from rigtwin.description.joint_elements import actuator_on
 from rigtwin.numerics.arrays import Array
 
+NEAR_GEAR = 2.0
+"""Factor within which a force before a gear may differ from what the model says of that gear."""
 SLOPE_LOW, SLOPE_HIGH = 0.2, 5.0
 """Measured force for each unit of the model's; beyond, its unit or a gear is in doubt."""
 SHOWN = 0.5
@@ -197,6 +199,13 @@ def _slope(log: Log, joint: str, positions: Mapping[str, Array], force: Array) -
     return force_slopes(log.mechanism, log.time(), positions, {joint: force}).get(joint)
 
 
+def _gear_of(log: Log, joint: str, ratio: float) -> float:
+    """Factor to the force that the model needs: the model's own gear where that is near it."""
+    actuator = actuator_on(log.mechanism, joint)
+    gear = actuator_constant(log.mechanism, actuator) if actuator is not None else 1.0
+    return gear if gear > 1.0 and 1.0 / NEAR_GEAR < gear * ratio < NEAR_GEAR else 1.0 / ratio
+
+
 def _check_force(log: Log, signal: LogSignal, slope: Slope) -> LogSignal:
     """The signal with its sign checked; a question is added where its scale is in doubt."""
     stated = signal.why == STATED
@@ -217,7 +226,7 @@ def _check_force(log: Log, signal: LogSignal, slope: Slope) -> LogSignal:
         question = ask(
             f"column {signal.column!r} is {abs(ratio):.3g} times the force that the model needs at "
             f"{signal.joint}; is it in another unit, or before a gear?",
-            option(signal.key, f"{1.0 / ratio:.4g} * {signal.column}"),
+            option(signal.key, f"{_gear_of(log, signal.joint, ratio):.4g} * {signal.column}"),
             option(signal.key, f"{signal.column} [{signal.unit}]") + " if it is right",
         )
         log.questions.append(str(question))

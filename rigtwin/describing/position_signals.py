@@ -13,6 +13,7 @@ from rigtwin.describing.quantity import JointQuantity
 from rigtwin.describing.question import Question, UnitQuestion, ask, enumerate_names, option
 from rigtwin.describing.signal import LogSignal
 from rigtwin.describing.unit_by_force import unit_by_force
+from rigtwin.describing.unit_by_velocity import unit_by_velocity
 from rigtwin.describing.units import Unit, position_units
 from rigtwin.description.joint_elements import movable_joints
 from rigtwin.errors import RigtwinError
@@ -125,7 +126,11 @@ def _units(log: Log, columns: dict[str, str]) -> dict[str, Unit] | None:
         return position_units(log.mechanism, log.columns, columns)
     except Question as question:
         if isinstance(question, UnitQuestion):
-            unit = unit_by_force(log, columns, question.units)
+            unit = unit_by_velocity(log, columns, question.units)
+            unit = unit or unit_by_force(log, columns, question.units)
+            if unit is None and question.likely:
+                small = question.units[-1]
+                unit = Unit(small, f"{small} by its range, as the joint has none of its own")
             if unit is not None:
                 return dict.fromkeys(columns, unit)
         log.questions.append(str(question))

@@ -23,11 +23,13 @@ class UnitQuestion(Question):
         Message with the options that answer it.
     units
         Units that are possible.
+    likely
+        Whether the last of them is taken where no other signal tells.
     """
 
-    def __init__(self, question: Question, *units: str) -> None:
+    def __init__(self, question: Question, *units: str, likely: bool = False) -> None:
         super().__init__(str(question))
-        self.units = units
+        self.units, self.likely = units, likely
 
 
 def ask(problem: str, *answers: str) -> Question:

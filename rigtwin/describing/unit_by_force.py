@@ -1,7 +1,8 @@
 """The unit of positions, by the forces that the model needs for the motion.
 
 An inertia needs 57.3 times the torque for a motion in rad that it needs for the same numbers in
-degrees, and 1000 times the force for metres instead of millimetres. No other error is as large.
+degrees, and 1000 times the force for metres instead of millimetres. Hardly another error is as
+large. A torque before a gear may be: there, only the right unit gives gravity the right course.
 """
 
 from __future__ import annotations
@@ -20,6 +21,9 @@ from rigtwin.description.joint_elements import actuator_on
 from rigtwin.importing.units import unit_of
 from rigtwin.numerics.arrays import Array
 
+CLEAR, POOR = 0.8, 0.3
+"""Share of the forces that the model explains with the right unit, and at most with any other, to
+tell the unit whatever the ratio."""
 SHOWN = 0.1
 """Share of a force that the model must explain to count."""
 CLOSE, FAR = 5.0, 8.0
@@ -49,18 +53,23 @@ def unit_by_force(log: Log, columns: Mapping[str, str], units: Sequence[str]) ->
     forces = _forces(log, list(columns))
     if log.clock is None or not forces:
         return None
-    ratios = {}
+    ratios, explained = {}, {}
     for unit in units:
         positions = {
             joint: unit_of(unit)[1] * bridge(log.columns.values[column])
             for joint, column in columns.items()
         }
         slopes = force_slopes(log.mechanism, log.time(), positions, forces)
+        explained[unit] = min((slope.explained for slope in slopes.values()), default=0.0)
         shown = [abs(slope.slope) for slope in slopes.values() if slope.explained > SHOWN]
         if shown:
             ratios[unit] = float(np.median(shown))
     if not ratios:
         return None
+    clearest = max(explained, key=lambda unit: explained[unit])
+    if explained[clearest] > CLEAR and sum(share > POOR for share in explained.values()) == 1:
+        share = 100.0 * explained[clearest]
+        return Unit(clearest, f"{clearest} by the forces, of which the model explains {share:.0f} %")
     misses = {unit: abs(math.log(ratio)) for unit, ratio in ratios.items()}
     best = min(misses, key=lambda unit: misses[unit])
     others = [miss for unit, miss in misses.items() if unit != best]

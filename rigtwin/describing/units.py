@@ -211,17 +211,13 @@ def _common_unit(
             answers[1],
             option(f"{beyond}.position", f"0.01745 * {column}"),
         )
+    if _limited(mechanism, beyond):
+        return Unit(small, f"{small} by its range, as {beyond} cannot be there in {si}")
     # The turn, or the metres, that such a joint is held to are an assumption: near it, the owner is
     # asked.
-    if turns and not _limited(mechanism, beyond) and largest < SURELY_DEGREES:
-        question = ask(
-            f"{reach}, and joint {beyond} has no range; are these rad or degrees?", *answers
-        )
-        raise UnitQuestion(question, si, small)
-    if not turns and not _limited(mechanism, beyond) and largest < SURELY_MILLIMETRES:
-        question = ask(f"{reach}, and joint {beyond} has no range; are these m or mm?", *answers)
-        raise UnitQuestion(question, si, small)
-    return Unit(small, f"{small} by its range, as {beyond} cannot be there in {si}")
+    names, surely = ("rad or degrees", SURELY_DEGREES) if turns else ("m or mm", SURELY_MILLIMETRES)
+    question = ask(f"{reach}, and joint {beyond} has no range; are these {names}?", *answers)
+    raise UnitQuestion(question, si, small, likely=largest >= surely)
 
 
 def _extremes(values: Array) -> tuple[float, float]:
