@@ -69,7 +69,9 @@ def unit_by_force(log: Log, columns: Mapping[str, str], units: Sequence[str]) ->
     clearest = max(explained, key=lambda unit: explained[unit])
     if explained[clearest] > CLEAR and sum(share > POOR for share in explained.values()) == 1:
         share = 100.0 * explained[clearest]
-        return Unit(clearest, f"{clearest} by the forces, of which the model explains {share:.0f} %")
+        return Unit(
+            clearest, f"{clearest} by the forces, of which the model explains {share:.0f} %"
+        )
     misses = {unit: abs(math.log(ratio)) for unit, ratio in ratios.items()}
     best = min(misses, key=lambda unit: misses[unit])
     others = [miss for unit, miss in misses.items() if unit != best]

@@ -165,6 +165,11 @@ def describe_attributed(
     """
     posterior, fit = explanation.posterior, explanation.fit
     shares = _shares(fit, named, evidence, posterior)
+    most = (
+        thresholds.unfinished_confidence
+        if explanation.ended_early
+        else thresholds.highest_confidence
+    )
     findings = []
     all_widths = _standard_errors(explanation, support, thresholds)
     for effect, values, widths in zip(fit.effects, fit.values, all_widths, strict=True):
@@ -177,7 +182,7 @@ def describe_attributed(
                 parameters=estimates(
                     effect, values, widths, evidence, thresholds.interval_half_width
                 ),
-                confidence=min(support[effect].confidence, thresholds.highest_confidence),
+                confidence=min(support[effect].confidence, most),
                 alternatives=tuple(_name(candidate) for candidate in (effect, *rivals)),
                 share=shares[effect],
                 title=effect.kind.title,

@@ -28,7 +28,7 @@ class Thresholds:
     """Number of hypotheses considered for extension in each round."""
     additions: int = 6
     """Number of further effects fitted beside each leader."""
-    effort: float = 120.0
+    effort: float = 300.0
     """Estimated processor time after which no further hypothesis is tried, s."""
     last_effort_share: float = 0.3
     """Share of `effort` that is kept for rivals of the best hypothesis."""
@@ -122,6 +122,9 @@ class Thresholds:
     """Share of the commands' amplitude below which a deviating controller setting is only noted."""
     highest_confidence: float = 0.98
     """Upper bound on every confidence."""
+    unfinished_confidence: float = 0.7
+    """Upper bound on every confidence of a search that ended early: hypotheses that were not tried
+    may be better."""
     retest_confidence: float = 0.9
     """Confidence below which another test is proposed."""
     interval_half_width: float = 2.5

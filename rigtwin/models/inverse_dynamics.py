@@ -45,7 +45,7 @@ STANDING, RESTING = 0.02, 0.1
 """Share of its rms speed below which a joint stands still, and shortest rest, s."""
 REGRESSORS = 40
 """Number of remembered regressors. A search returns to few motions."""
-ROW_EFFORT = 3e-7
+ROW_EFFORT = 2e-7
 """Estimated processor time of a tick for each joint, s."""
 DRAWS = 2
 """Number of draws of the motions' noise."""

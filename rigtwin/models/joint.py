@@ -30,7 +30,7 @@ SMALL = 0.02
 """Size of a small disturbance, as a share of the signal's standard deviation."""
 SHORTEST_END = 20
 """Divisor of a recording's length that gives the largest part left out at each end."""
-STEP_EFFORT = 6e-7
+STEP_EFFORT = 3e-7
 """Estimated processor time of an integration step, s."""
 SEED = 7
 """Seed of the noise that is propagated through the machine."""

@@ -11,7 +11,7 @@ SEARCH = {
     "precise_fit_shortfall": 0.2,
     "leaders": 3,
     "additions": 6,
-    "effort": 120.0,
+    "effort": 300.0,
     "last_effort_share": 0.3,
     "negligible_share": 0.02,
 }
@@ -49,6 +49,7 @@ WORDS = {
     "worsening_factor": 1.05,
     "controller_consequence": 1e-3,
     "highest_confidence": 0.98,
+    "unfinished_confidence": 0.7,
     "retest_confidence": 0.9,
     "interval_half_width": 2.5,
     "rest_correlation": 0.3,
