@@ -101,6 +101,10 @@ def page(look, tmp_path) -> Iterator[Page]:
         yield page
 
 
+SLOWEST = 3.0
+"""s, until a busy computer shows a prediction."""
+
+
 def opened(tab: Tab) -> Tab:
     """A tab whose page is there, with what drives it."""
     tab.wait_for("document.getElementById('overall')?.textContent")
@@ -115,11 +119,23 @@ def drag(tab: Tab, name: str, shares: list[float], steps: int = 1) -> list[float
     tab.mouse("Pressed", x + shares[0] * width, y)
     errors = []
     for share in shares:
+        before = tab.ask("overall()")
         tab.mouse("Moved", x + share * width, y)
         time.sleep(0.4)
+        # On a busy computer the prediction takes longer; it may also be the same as before.
+        until = time.monotonic() + SLOWEST
+        while tab.ask("overall()") == before and time.monotonic() < until:
+            time.sleep(0.1)
         errors.append(tab.ask("overall()"))
     tab.mouse("Released", x + shares[-1] * width, y)
     return errors
+
+
+def in_front(tab: Tab) -> float:
+    """The error that a tab shows once it is in front and had time to draw."""
+    tab.call("Page.bringToFront")
+    time.sleep(0.5)
+    return tab.wait_for("overall()")
 
 
 def press(tab: Tab, text: str) -> None:
@@ -157,11 +173,11 @@ def test_a_person_drags_scrubs_fits_and_saves(look, page, tmp_path):
         # A second tab shows the same, and the first goes on without it.
         with running.tab(page.url) as second:
             other = opened(second)
-            # The last move's prediction may arrive in one tab before the other.
+            # The last move's prediction may arrive in one tab before the other, and a browser draws
+            # only the tab in front.
             until = time.monotonic() + PATIENCE
-            while other.wait_for("overall()") != tab.ask("overall()"):
+            while in_front(other) != in_front(tab):
                 assert time.monotonic() < until, "the tabs show different values"
-                time.sleep(0.1)
         tab.ask("marked = JSON.stringify(Array.from(traces()[0][0])); true")
         drag(tab, "time, s", [0.5], steps=0)
         assert tab.wait_for("JSON.stringify(Array.from(traces()[0][0])) !== marked")
