@@ -106,8 +106,8 @@ def _add_scope(parser: argparse.ArgumentParser) -> None:
         "--effort",
         type=float,
         metavar="SECONDS",
-        help="processor time, about, after which no further hypothesis is tried; default "
-        f"{STANDARD.effort:.0f}",
+        help="estimated processor time after which the search tries no further hypothesis; "
+        f"default {STANDARD.effort:.0f}",
     )
 
 
@@ -142,7 +142,7 @@ def execute(parsed: argparse.Namespace) -> int:
         }
         if parsed.changed:
             if parsed.effort is not None:
-                raise RigtwinError("--effort: of a diagnosis, not of --changed")
+                raise RigtwinError("--changed does not search for effects; leave out --effort")
             changes = rigtwin.what_changed(recordings, **options)
             if parsed.json is not None:
                 write_json(parsed.json, changes.document())

@@ -17,7 +17,7 @@ from rigtwin.description.joint_elements import actuator_on
 from rigtwin.numerics.arrays import Array
 
 NEAR_GEAR = 2.0
-"""Factor within which a force before a gear may differ from what the model says of that gear."""
+"""Factor within which the ratio of two forces may differ from the gear of the model's actuator."""
 SLOPE_LOW, SLOPE_HIGH = 0.2, 5.0
 """Measured force for each unit of the model's; beyond, its unit or a gear is in doubt."""
 SHOWN = 0.5
@@ -199,8 +199,11 @@ def _slope(log: Log, joint: str, positions: Mapping[str, Array], force: Array) -
     return force_slopes(log.mechanism, log.time(), positions, {joint: force}).get(joint)
 
 
-def _gear_of(log: Log, joint: str, ratio: float) -> float:
-    """Factor to the force that the model needs: the model's own gear where that is near it."""
+def _factor(log: Log, joint: str, ratio: float) -> float:
+    """Factor from a column to the force that the model needs, for a question.
+
+    It is the gear of the model's actuator where that is near the inverse of `ratio`.
+    """
     actuator = actuator_on(log.mechanism, joint)
     gear = actuator_constant(log.mechanism, actuator) if actuator is not None else 1.0
     return gear if gear > 1.0 and 1.0 / NEAR_GEAR < gear * ratio < NEAR_GEAR else 1.0 / ratio
@@ -226,7 +229,7 @@ def _check_force(log: Log, signal: LogSignal, slope: Slope) -> LogSignal:
         question = ask(
             f"column {signal.column!r} is {abs(ratio):.3g} times the force that the model needs at "
             f"{signal.joint}; is it in another unit, or before a gear?",
-            option(signal.key, f"{_gear_of(log, signal.joint, ratio):.4g} * {signal.column}"),
+            option(signal.key, f"{_factor(log, signal.joint, ratio):.4g} * {signal.column}"),
             option(signal.key, f"{signal.column} [{signal.unit}]") + " if it is right",
         )
         log.questions.append(str(question))

@@ -69,7 +69,7 @@ def unit_by_velocity(log: Log, columns: Mapping[str, str], units: Sequence[str])
 
 
 def _ratio(time: Array, position: Array, velocity: Array) -> float | None:
-    """Rate of a position for each unit of the velocity; None where one does not follow the other.
+    """Rate of a position divided by the velocity; None where they do not correlate.
 
     All arguments have the shape (rows,).
     """

@@ -10,6 +10,9 @@
 
 A hypothesis is fitted on coarse evidence: half the integration steps, thinned where the models
 allow it. It is scored on the same ticks with all integration steps.
+
+The search ends early where its predictions have cost the effort of `Thresholds`, which is counted
+in integration steps. A share of it is kept for step 5.
 """
 
 from __future__ import annotations
