@@ -27,12 +27,13 @@ from rigtwin.components.sensors import (
     VelocitySensor,
     measures,
 )
-from rigtwin.components.servo import PUSHERS, Pusher, Servo
+from rigtwin.components.servo import PUSHERS, SERVOS, Pusher, Servo, VelocityServo
 from rigtwin.components.tyre import Tyre
 
 __all__ = [
     "KINDS",
     "PUSHERS",
+    "SERVOS",
     "UNLIMITED",
     "Base",
     "Body",
@@ -65,6 +66,7 @@ __all__ = [
     "Swing",
     "Tyre",
     "VelocitySensor",
+    "VelocityServo",
     "candidates",
     "component_of",
     "find",

@@ -37,7 +37,7 @@ from rigtwin.components.sensors import (
     PositionSensor,
     VelocitySensor,
 )
-from rigtwin.components.servo import PUSHERS, Pusher, Servo
+from rigtwin.components.servo import PUSHERS, Pusher, Servo, VelocityServo
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
 from rigtwin.numerics.delay import delay_sample, ring
@@ -262,7 +262,7 @@ def _for_types(guess: Guess | None, *types: type) -> dict[type, Guess | None]:
 
 
 RIG = (Motor, Cylinder, *DECLARED)
-LIMITED_COMMANDS = (ForceActuator, PositionActuator)
+LIMITED_COMMANDS = (ForceActuator, VelocityServo, PositionActuator)
 DESCRIBED_ACTUATORS = (*LIMITED_COMMANDS, Servo)
 DESCRIBED_SENSORS = (PositionSensor, VelocitySensor, ForceSensor)
 DESCRIBED = (*DESCRIBED_ACTUATORS, *DESCRIBED_SENSORS)

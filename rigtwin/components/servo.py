@@ -1,10 +1,14 @@
-"""Servo: an actuator with a position controller of its own.
+"""Servos: actuators with a controller of position or velocity of their own.
 
-    force = clip(gains·(position_gain·(command − position) − damping_gain·speed), ±force_limit)
+    position servo: force = clip(gains·(position_gain·(command − position) − damping_gain·speed))
+    velocity servo: force = clip(gains·(velocity_gain·command − damping_gain·speed))
 
-This is MuJoCo's `position` actuator with `kp`, `kv` and `forcerange` (MuJoCo, XML reference,
-actuator/position). `gains` scales both gains, as a wrong torque constant of the motor does. Units
-are those of a sliding joint; for a turning joint, read rad for m and Nm for N.
+Both forces are limited to ±force_limit. These are MuJoCo's `position` actuator with `kp`, `kv` and
+`forcerange`, and its `velocity` actuator, whose two gains are equal (MuJoCo, XML reference,
+actuator/position and actuator/velocity). A DC motor driven by a voltage has the law of a velocity
+servo too, with the back-EMF as its damping. `gains` scales both gains, as a wrong torque constant
+of the motor does. Units are those of a sliding joint; for a turning joint, read rad for m and Nm
+for N.
 """
 
 from __future__ import annotations
@@ -50,8 +54,39 @@ class Servo(NamedTuple):
     play_compliance: Annotated[float, Quantity("m/N", 0.0, 1e3, NONE)] = 0.0
 
 
-Pusher = ForceActuator | Servo
-PUSHERS = (ForceActuator, Servo)
+class VelocityServo(NamedTuple):
+    """Actuator that controls a velocity by a force.
+
+    Order of operations: limits of the command, delay, deadband, gain, saturation, rate limit, lag,
+    then the law.
+    """
+
+    # Law of the servo, by the MJCF.
+    velocity_gain: Annotated[float, Quantity("N/unit of the command", -1e12, 1e12, MJCF)] = 1.0
+    damping_gain: Annotated[float, Quantity("Ns/m", 0.0, 1e12, MJCF)] = 1.0
+    force_limit: Annotated[float, Quantity("N", 1e-9, UNLIMITED, MJCF)] = UNLIMITED
+    command_low: Annotated[
+        float, Quantity("unit of the command", -UNLIMITED, UNLIMITED, MJCF)
+    ] = -UNLIMITED
+    command_high: Annotated[float, Quantity("unit of the command", -UNLIMITED, UNLIMITED, MJCF)] = (
+        UNLIMITED
+    )
+    gains: Annotated[float, Quantity("1", 0.05, 20.0, "1: as specified")] = 1.0
+    # Conditioning of the command; neutral in the nominal machine.
+    gain: Annotated[float, Quantity("1", 0.05, 5.0, "1: as specified")] = 1.0
+    lag: Annotated[float, Quantity("s", 0.0, 10.0, NONE)] = 0.0
+    delay: Annotated[float, Quantity("s", 0.0, 1.0, NONE)] = 0.0
+    deadband: Annotated[float, Quantity("unit of the command", 0.0, UNLIMITED, NONE)] = 0.0
+    saturation: Annotated[float, Quantity("unit of the command", 1e-9, UNLIMITED, NONE)] = UNLIMITED
+    rate_limit: Annotated[float, Quantity("unit of the command/s", 1e-9, UNLIMITED, NONE)] = (
+        UNLIMITED
+    )
+
+
+SERVOS = (Servo, VelocityServo)
+"""Types of actuators whose force depends on the joint's motion."""
+Pusher = ForceActuator | Servo | VelocityServo
+PUSHERS = (ForceActuator, *SERVOS)
 """Types of actuators that exert a force on a joint, whose motion follows from it."""
 
 
@@ -81,7 +116,7 @@ class Push(NamedTuple):
     """Law of a force actuator or servo as compiled code takes it."""
 
     constant: float  # Force per unit of the command, N per unit.
-    position_gain: float  # Position gain of a servo, N/m; 0 for a force actuator.
+    position_gain: float  # Position gain of a position servo, N/m; 0 for any other actuator.
     damping_gain: float  # Damping gain of a servo, Ns/m.
     band: float  # Force within a servo's deadband, N.
     limit: float  # Largest force, N.
@@ -94,15 +129,27 @@ def push_law(actuator: Pusher) -> Push:
         stiffness = actuator.gains * actuator.position_gain
         damping = actuator.gains * actuator.damping_gain
         return Push(stiffness, stiffness, damping, stiffness * actuator.deadband, limit)
+    if isinstance(actuator, VelocityServo):
+        gain = actuator.gains * actuator.velocity_gain
+        return Push(gain, 0.0, actuator.gains * actuator.damping_gain, 0.0, limit)
     return Push(actuator.constant, 0.0, 0.0, 0.0, limit)
 
 
 @compilable
-def pull(law: Push, command: float, position: float) -> float:
-    """Return a servo's position force, N, without damping and limit.
+def depends_on_motion(law: Push) -> bool:
+    """Return whether a force depends on position or velocity, as a servo's does."""
+    return law.position_gain > 0.0 or law.damping_gain > 0.0
 
-    It is position_gain·(command − position), shrunk towards zero by the deadband.
+
+@compilable
+def pull(law: Push, command: float, position: float) -> float:
+    """Return a servo's force, N, without damping and limit.
+
+    It is constant·command of a velocity servo, and position_gain·(command − position) of a position
+    servo, shrunk towards zero by the deadband.
     """
+    if law.position_gain == 0.0:
+        return law.constant * command
     force = law.position_gain * (command - position)
     return math.copysign(max(abs(force) - law.band, 0.0), force)
 
@@ -125,9 +172,7 @@ def push(law: Push, command: float, position: float, speed: float) -> float:
     float
         Force, N.
     """
-    force = law.constant * command
-    if law.position_gain > 0.0:
-        force = pull(law, command, position) - law.damping_gain * speed
+    force = pull(law, command, position) - law.damping_gain * speed
     return min(max(force, -law.limit), law.limit)
 
 
@@ -171,8 +216,8 @@ KINDS = (
         "gains",
         "factor on both gains",
         ("gains",),
-        "position and damping gain multiplied by this factor, as by a wrong torque constant",
-        {Servo: shares_of_nominal((0.3, 0.6, 1.6, 3.5), 0.004)},
+        "both gains of the servo multiplied by this factor, as by a wrong torque constant",
+        dict.fromkeys(SERVOS, shares_of_nominal((0.3, 0.6, 1.6, 3.5), 0.004)),
     ),
     Kind(
         "position_gain",
@@ -186,6 +231,7 @@ KINDS = (
         "damping gain",
         ("damping_gain",),
         "force for each unit of speed, against it",
+        # A velocity servo's damping acts as the joint's own, so that nothing tells them apart.
         {Servo: _damping_gain},
     ),
     Kind(
@@ -193,6 +239,6 @@ KINDS = (
         "limit of the force",
         ("force_limit",),
         "force limited to this magnitude",
-        {Servo: _force_limit},
+        dict.fromkeys(SERVOS, _force_limit),
     ),
 )

@@ -5,16 +5,21 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import replace
 
+import numpy as np
+
 from rigtwin.describing.checks import follows
 from rigtwin.describing.force_signals import force_signal
 from rigtwin.describing.log import STATED, Log
 from rigtwin.describing.quantity import SI, JointQuantity
 from rigtwin.describing.question import Question, option
+from rigtwin.describing.replay_kind import command_quantities, takes_force
 from rigtwin.describing.signal import LogSignal
 from rigtwin.describing.units import Unit, actuator_constant, command_unit
 from rigtwin.description.joint_elements import actuator_on
 from rigtwin.numerics.arrays import Array
 
+SPAN = 0.05
+"""Time over which the rate of a position is taken, s."""
 OPPOSED = -0.5
 """Correlation of a command and a position below which the command's sign is turned."""
 
@@ -71,7 +76,9 @@ def position_command(log: Log, joint: str, position: Array) -> LogSignal | None:
     )
 
 
-def force_command(log: Log, joint: str, measured: Collection[str]) -> LogSignal | None:
+def force_command(
+    log: Log, joint: str, measured: Collection[str], position: Array
+) -> LogSignal | None:
     """Return the command of an actuator that pushes, as the actuator takes it.
 
     Parameters
@@ -82,18 +89,58 @@ def force_command(log: Log, joint: str, measured: Collection[str]) -> LogSignal 
         Joint that the actuator pushes.
     measured
         Joints whose measured force can take the place of a command.
+    position
+        Position of the joint, SI, shape (rows,).
     """
-    for quantity in (JointQuantity.FORCE_COMMAND, JointQuantity.COMMAND):
+    for quantity in command_quantities(log.mechanism, joint):
         if log.slots.has(joint, quantity):
+            if quantity is JointQuantity.VELOCITY_COMMAND:
+                return _velocity_command(log, joint, position)
             return _control(log, joint, quantity)
     # Without any command, the measured force itself is what pushes the model's joint.
-    if joint in measured and (signal := force_signal(log, joint)) is not None:
+    pushes = takes_force(log.mechanism, joint)
+    if pushes and joint in measured and (signal := force_signal(log, joint)) is not None:
         return replace(_as_control(log, signal), quantity=JointQuantity.FORCE_COMMAND)
     log.questions.append(
         f"no column is the command of joint {joint}; say "
         f"{option(f'{joint}.command', 'COLUMN')} or {option(f'{joint}.command', '0')}"
     )
     return None
+
+
+def _velocity_command(log: Log, joint: str, position: Array) -> LogSignal | None:
+    """The command of a velocity servo; None where a question is open."""
+    quantity, key = JointQuantity.VELOCITY_COMMAND, f"{joint}.command"
+    try:
+        match = log.slots.match(joint, quantity)
+        si = SI[quantity][log.mechanism.turns(joint)]
+        velocity = _velocity(position, log.time())
+        unit = command_unit(log.columns, match.column, velocity, si, key)
+    except Question as question:
+        log.questions.append(str(question))
+        return None
+    assumed = [unit.assumed] if unit.assumed else []
+    opposed = follows(log.columns.values[match.column], velocity) < OPPOSED
+    if opposed:
+        assumed.append("sign turned, as the velocity goes against it")
+    return LogSignal(
+        joint=joint,
+        quantity=quantity,
+        column=match.column,
+        formula="",
+        unit=unit.name,
+        sign=-1.0 if opposed else 1.0,
+        why=match.why,
+        assumed=tuple(assumed),
+    )
+
+
+def _velocity(position: Array, time: Array) -> Array:
+    """Rate of a measured position over `SPAN`, which evens its noise out, shape (rows,)."""
+    period = float(time[-1] - time[0]) / max(len(time) - 1, 1)
+    reach = max(round(0.5 * SPAN / max(period, 1e-9)), 1)
+    inner = (position[2 * reach :] - position[: -2 * reach]) / (2.0 * reach * period)
+    return np.pad(inner, reach, mode="edge")
 
 
 def no_force(joint: str) -> LogSignal:
@@ -154,7 +201,8 @@ def _as_control(log: Log, signal: LogSignal) -> LogSignal:
     constant = actuator_constant(log.mechanism, actuator_on(log.mechanism, signal.joint) or "")
     # The log holds a force, but the recording's channel is the control: force = gear · gain ·
     # control.
-    if constant in (0.0, 1.0) or signal.unit == "1" or signal.formula:
+    is_control = constant in (0.0, 1.0) or signal.unit == "1" or signal.formula
+    if is_control or not takes_force(log.mechanism, signal.joint):
         return signal
     return replace(
         signal,

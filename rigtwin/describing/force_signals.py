@@ -11,6 +11,7 @@ from rigtwin.describing.checks import Slope, force_slopes, is_magnitude
 from rigtwin.describing.log import STATED, Log
 from rigtwin.describing.quantity import SI, JointQuantity
 from rigtwin.describing.question import Question, ask, enumerate_names, option
+from rigtwin.describing.replay_kind import takes_force
 from rigtwin.describing.signal import LogSignal
 from rigtwin.describing.units import Unit, actuator_constant, force_unit
 from rigtwin.description.joint_elements import actuator_on
@@ -22,6 +23,8 @@ SLOPE_LOW, SLOPE_HIGH = 0.2, 5.0
 """Measured force for each unit of the model's; beyond, its unit or a gear is in doubt."""
 SHOWN = 0.5
 """Share of a force that the model must explain for its scale or sign to be judged."""
+MOTIONS = (JointQuantity.POSITION, JointQuantity.VELOCITY)
+"""Quantities that are no force."""
 SUGGESTED = 3
 """Columns of one joint that a question offers."""
 
@@ -111,16 +114,22 @@ def check_forces(
     positions
         Joint → position, SI, shape (rows,).
     """
-    values = {s.joint: log.values(s) for s in signals if s.quantity is not JointQuantity.POSITION}
+    checked = [s for s in signals if s.quantity not in MOTIONS and _is_force(log, s)]
+    values = {s.joint: log.values(s) for s in checked}
     # A force of zero has no slope.
     values = {joint: each for joint, each in values.items() if np.any(each)}
     slopes = force_slopes(log.mechanism, log.time(), positions, values)
     return [
         signal
-        if signal.quantity is JointQuantity.POSITION or signal.joint not in slopes
+        if signal not in checked or signal.joint not in slopes
         else _check_force(log, signal, slopes[signal.joint])
         for signal in signals
     ]
+
+
+def _is_force(log: Log, signal: LogSignal) -> bool:
+    """Whether a force follows from a signal alone, and not from the motion as well."""
+    return not signal.commands or takes_force(log.mechanism, signal.joint)
 
 
 def suggest_forces(

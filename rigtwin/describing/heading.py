@@ -20,6 +20,7 @@ GREEK = {"θ": "theta", "τ": "tau", "φ": "phi", "ω": "omega", "ϕ": "phi"}
 """Letters that columns are named by."""
 PRECEDENCE = (
     JointQuantity.OTHER,
+    JointQuantity.VOLTAGE,
     JointQuantity.CURRENT,
     JointQuantity.FORCE,
     JointQuantity.VELOCITY,

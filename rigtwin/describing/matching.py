@@ -162,7 +162,9 @@ def _commanded(quantity: JointQuantity | None) -> JointQuantity:
         return JointQuantity.FORCE_COMMAND
     if quantity in (None, JointQuantity.POSITION):
         return JointQuantity.COMMAND
-    return JointQuantity.OTHER
+    if quantity is JointQuantity.VELOCITY:
+        return JointQuantity.VELOCITY_COMMAND
+    return JointQuantity.VOLTAGE if quantity is JointQuantity.VOLTAGE else JointQuantity.OTHER
 
 
 def _place(inner: tuple[str, ...], outer: tuple[str, ...]) -> int | None:

@@ -16,6 +16,10 @@ class JointQuantity(Enum):
     """Command of the joint's actuator: a position, or a force, as the actuator takes it."""
     FORCE_COMMAND = "force command"
     """Command that says itself that it is a force or a torque."""
+    VELOCITY_COMMAND = "velocity command"
+    """Command that says itself that it is a velocity."""
+    VOLTAGE = "voltage"
+    """Voltage of the joint's motor."""
     OTHER = "other"
     """Quantity that no test needs, such as an acceleration or a temperature."""
 
@@ -36,9 +40,10 @@ WORDS: dict[JointQuantity, frozenset[str]] = {
         "tau torque torques force forces effort efforts trq tq frc moment loadcell"
     ),
     JointQuantity.CURRENT: _words("current currents cur curr amps amperage"),
+    JointQuantity.VOLTAGE: _words("voltage volt volts"),
     JointQuantity.OTHER: _words(
-        "acc accel acceleration ddq qdd qacc temp temperature voltage volt volts error err status "
-        "mode flag index episode frame task imu gyro quat id seq count"
+        "acc accel acceleration ddq qdd qacc temp temperature error err status mode flag index "
+        "episode frame task imu gyro quat id seq count"
     ),
 }
 """Quantity → words that name it."""
@@ -107,6 +112,7 @@ SI = {
     JointQuantity.VELOCITY: ("m/s", "rad/s"),
     JointQuantity.FORCE: ("N", "Nm"),
     JointQuantity.FORCE_COMMAND: ("N", "Nm"),
+    JointQuantity.VELOCITY_COMMAND: ("m/s", "rad/s"),
     JointQuantity.CURRENT: ("A", "A"),
 }
 """Quantity → SI unit where the joint slides, and where it turns."""

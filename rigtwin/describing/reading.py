@@ -21,6 +21,7 @@ from rigtwin.describing.question import Question, enumerate_names, option
 from rigtwin.describing.replay_kind import ReplayKind, choose_kind, free_swing
 from rigtwin.describing.signal import LogSignal
 from rigtwin.describing.slots import Slots
+from rigtwin.describing.velocity_signals import integrate, joints_by_velocity, velocity_signals
 from rigtwin.description.coupling import are_coupled
 from rigtwin.description.implied import FORCES, INVERSE
 from rigtwin.description.joint_elements import actuator_on, movable_joints, swinging
@@ -53,6 +54,8 @@ class Reading:
         Assumptions that belong to no single signal.
     idle
         Joints whose actuator does nothing throughout.
+    velocities
+        Joints whose velocity was measured in place of their position.
     band
         Frequency up to which forces are judged, Hz; None where all is judged.
     """
@@ -64,6 +67,7 @@ class Reading:
     unused: Mapping[str, str]
     notes: tuple[str, ...] = ()
     idle: tuple[str, ...] = ()
+    velocities: tuple[str, ...] = ()
     band: float | None = None
 
 
@@ -91,24 +95,21 @@ def read_log(
     if columns.rows < FEWEST:
         raise RigtwinError(f"it has {columns.rows} rows; expected at least {FEWEST}")
     log, matches = _open(mechanism, columns, stated)
-    joints = log.slots.joints(JointQuantity.POSITION, movable_joints(mechanism))
-    if not joints:
-        ask_positions(log)
-        raise _all_questions(log, ())
-    positions = position_signals(log, joints)
-    if positions is None:
-        raise _all_questions(log, ())
-    values = {joint: log.values(signal) for joint, signal in positions.items()}
-    kind, movers = _choose_movers(log, test, list(positions.values()), values)
-    signals = [*positions.values(), *movers]
+    motions = _motions(log)
+    joints = list(motions)
+    values = {joint: _position(log, signal) for joint, signal in motions.items()}
+    kind, movers = _choose_movers(log, test, list(motions.values()), values)
+    signals = [*motions.values(), *movers]
     # Only forces can be held against inverse dynamics.
     if kind.test in (INVERSE, FORCES):
         signals = check_forces(log, signals, values)
     if log.questions or log.clock is None:
         raise _all_questions(log, signals)
     _note_resting(log, joints)
+    velocities = [s.joint for s in motions.values() if s.quantity is JointQuantity.VELOCITY]
     if kind.test != INVERSE:
-        log.notes.append("positions have the signs of the log")
+        measured = "velocities" if velocities else "positions"
+        log.notes.append(f"{measured} have the signs of the log")
     idle = [signal.joint for signal in movers if not np.any(log.values(signal))]
     band = _band(log, kind.test, values)
     return Reading(
@@ -119,8 +120,30 @@ def read_log(
         unused=_unused(log, signals, matches),
         notes=tuple(log.notes),
         idle=tuple(idle) if kind.test == FORCES else (),
+        velocities=tuple(velocities),
         band=band,
     )
+
+
+def _motions(log: Log) -> dict[str, LogSignal]:
+    """The measured positions by joint, or velocities where the log holds no position."""
+    joints = log.slots.joints(JointQuantity.POSITION, movable_joints(log.mechanism))
+    if joints:
+        motions = position_signals(log, joints)
+    else:
+        motions = velocity_signals(log, joints_by_velocity(log))
+        if not motions and not log.questions:
+            ask_positions(log)
+    if not motions:
+        raise _all_questions(log, ())
+    return motions
+
+
+def _position(log: Log, signal: LogSignal) -> Array:
+    """Position of a joint, SI, shape (rows,): measured, or by its velocity from zero on."""
+    if signal.quantity is JointQuantity.POSITION or log.clock is None:
+        return log.values(signal)
+    return integrate(log.values(signal), log.time())
 
 
 def _choose_movers(
@@ -130,7 +153,8 @@ def _choose_movers(
     joints = list(positions)
     forces, still = force_signals(log, positions)
     try:
-        kind = choose_kind(log.mechanism, log.slots, joints, list(forces), still, test)
+        placed = all(signal.quantity is JointQuantity.POSITION for signal in signals)
+        kind = choose_kind(log.mechanism, log.slots, joints, list(forces), still, placed, test)
     except Question as question:
         before = len(log.questions)
         # A suggestion by the data is worth more than the general question, which follows where
@@ -207,7 +231,7 @@ def _movers(
             mover = no_force(joint)
         elif actuator_on(log.mechanism, joint) is not None:
             mover = (
-                force_command(log, joint, {*forces, *still})
+                force_command(log, joint, {*forces, *still}, position)
                 if test == FORCES
                 else position_command(log, joint, position)
             )

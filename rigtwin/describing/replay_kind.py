@@ -46,6 +46,7 @@ def choose_kind(
     joints: Sequence[str],
     measured: Sequence[str],
     still: Sequence[str],
+    placed: bool,
     stated: str = "",
 ) -> ReplayKind:
     """Choose the kind of test.
@@ -57,11 +58,13 @@ def choose_kind(
     slots
         Columns that the log offers.
     joints
-        Joints whose position the log holds.
+        Joints that the log describes.
     measured
         Joints whose force was measured, with its sign.
     still
         Joints whose force is zero throughout.
+    placed
+        Whether the log holds positions, and not velocities alone.
     stated
         Kind of test that the owner of the log states; empty without one.
 
@@ -78,27 +81,27 @@ def choose_kind(
     positions = [j for j in joints if _takes_position(mechanism, j)]
     commanded = slots.joints(JointQuantity.COMMAND, joints)
     # Measured forces come first: they need no model of the actuators.
-    if len(measured) == len(joints):
+    if len(measured) == len(joints) and placed:
         beside = " (position commands are there too: --test servos)" if commanded else ""
         return ReplayKind(INVERSE, f"the force at every joint was measured{beside}")
     # Every command goes to an actuator that takes a position.
-    if commanded and set(commanded) <= set(positions):
+    if commanded and set(commanded) <= set(positions) and placed:
         return _position_test(mechanism, commanded)
     pushed = [
         joint
         for joint in joints
         if actuator_on(mechanism, joint)
         and (
-            joint in measured
-            or joint in still
-            or slots.has(joint, JointQuantity.FORCE_COMMAND)
-            or (joint in commanded and joint not in positions)
+            ((joint in measured or joint in still) and takes_force(mechanism, joint))
+            or any(slots.has(joint, quantity) for quantity in command_quantities(mechanism, joint))
         )
     ]
     # Joints without an actuator move freely; all others must be pushed by something known.
     if pushed and all(actuator_on(mechanism, j) is None or j in pushed for j in joints):
         if set(pushed) <= set(still):
             return ReplayKind(FORCES, "the force is 0 throughout: the joints swing freely")
+        if any(mechanism.falls_with_speed(actuator_on(mechanism, j) or "") for j in pushed):
+            return ReplayKind(FORCES, "the actuators' commands are in the log")
         return ReplayKind(FORCES, "the actuators take forces, and those are in the log")
     raise _question(mechanism, joints, measured, commanded)
 
@@ -134,6 +137,39 @@ def free_swing(
         if meaning.commanded or meaning.quantity in MOVING:
             raise RigtwinError(f"column {column!r}: {why}")
     return ReplayKind(FORCES, "the model has no actuator: the joints swing freely")
+
+
+def command_quantities(mechanism: Mechanism, joint: str) -> tuple[JointQuantity, ...]:
+    """Return the quantities that can be the command of a joint's actuator that takes no position.
+
+    Parameters
+    ----------
+    mechanism
+        The compiled MJCF or URDF.
+    joint
+        Joint with an actuator.
+    """
+    actuator = actuator_on(mechanism, joint) or ""
+    if actuator and mechanism.positions(actuator):
+        return (JointQuantity.FORCE_COMMAND,)
+    if mechanism.is_dc_motor(actuator):
+        return JointQuantity.COMMAND, JointQuantity.VOLTAGE
+    if mechanism.falls_with_speed(actuator):
+        return JointQuantity.VELOCITY_COMMAND, JointQuantity.COMMAND
+    return JointQuantity.FORCE_COMMAND, JointQuantity.COMMAND
+
+
+def takes_force(mechanism: Mechanism, joint: str) -> bool:
+    """Return whether the force of a joint's actuator follows from its command alone.
+
+    Parameters
+    ----------
+    mechanism
+        The compiled MJCF or URDF.
+    joint
+        Joint with an actuator.
+    """
+    return not mechanism.falls_with_speed(actuator_on(mechanism, joint) or "")
 
 
 def _takes_position(mechanism: Mechanism, joint: str) -> bool:

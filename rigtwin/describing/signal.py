@@ -6,6 +6,9 @@ from dataclasses import dataclass
 
 from rigtwin.describing.quantity import JointQuantity
 
+MEASUREMENTS = (JointQuantity.POSITION, JointQuantity.VELOCITY, JointQuantity.FORCE)
+"""Quantities that a sensor measures."""
+
 
 @dataclass(frozen=True)
 class LogSignal:
@@ -53,9 +56,12 @@ class LogSignal:
     @property
     def key(self) -> str:
         """Name by which the signal can be corrected, such as elbow.position."""
-        quantity = self.quantity
-        name = "command" if quantity is JointQuantity.FORCE_COMMAND else quantity.value
-        return f"{self.joint}.{name}"
+        return f"{self.joint}.{'command' if self.commands else self.quantity.value}"
+
+    @property
+    def commands(self) -> bool:
+        """Whether the quantity is a command of the joint's actuator."""
+        return self.quantity not in MEASUREMENTS
 
     @property
     def source(self) -> str:

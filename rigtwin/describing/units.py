@@ -127,8 +127,8 @@ def position_units(
     return units
 
 
-def command_unit(columns: Columns, column: str, position: Array, si: str, key: str) -> Unit:
-    """Return the unit of a position command, by the position that follows it.
+def command_unit(columns: Columns, column: str, motion: Array, si: str, key: str) -> Unit:
+    """Return the unit of a command, by the position or velocity that follows it.
 
     Parameters
     ----------
@@ -136,10 +136,10 @@ def command_unit(columns: Columns, column: str, position: Array, si: str, key: s
         Columns of the log.
     column
         Column of the command.
-    position
-        Position of the joint, SI, shape (rows,).
+    motion
+        Position or velocity of the joint, SI, shape (rows,).
     si
-        SI unit of the position.
+        SI unit of the motion.
     key
         Name of the command, for a question.
 
@@ -151,16 +151,17 @@ def command_unit(columns: Columns, column: str, position: Array, si: str, key: s
     known = known_unit(columns, column, si, key)
     if known is not None:
         return known
-    small = {"rad": "deg", "m": "mm"}[si]
-    stroke, followed = _stroke(columns.values[column]), _stroke(position)
+    measured = "velocity" if si.endswith("/s") else "position"
+    small = {"rad": "deg", "m": "mm", "rad/s": "deg/s", "m/s": "mm/s"}[si]
+    stroke, followed = _stroke(columns.values[column]), _stroke(motion)
     if stroke == 0.0 or followed == 0.0:
         return Unit(si, f"{si}, as nothing moves")
     # SI first: strokes of 1 and 57.3 are a factor apart that no tracking error explains.
     for name in (si, small):
         if 1.0 / ALIKE < unit_of(name)[1] * stroke / followed < ALIKE:
-            return Unit(name, f"{name} by the stroke of the position")
+            return Unit(name, f"{name} by the stroke of the {measured}")
     raise ask(
-        f"column {column!r} has a stroke of {stroke:.4g}, and the position that follows it "
+        f"column {column!r} has a stroke of {stroke:.4g}, and the {measured} that follows it "
         f"{followed:.4g} {si}; in what unit is it?",
         option(key, f"{column} [{small}]"),
         option(key, f"0.01 * {column}"),

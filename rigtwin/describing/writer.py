@@ -30,7 +30,7 @@ def channel_of(mechanism: Mechanism, signal: LogSignal) -> str:
     signal
         LogSignal of a log.
     """
-    if signal.quantity in (JointQuantity.POSITION, JointQuantity.FORCE):
+    if not signal.commands:
         return f"/sensor.{sensor_name(mechanism, signal.joint, signal.quantity.value)}"
     return f"/command.{actuator_name(mechanism, signal.joint)}"
 
@@ -69,6 +69,8 @@ def write_description(
     ]
     if list(reading.joints) != movable_joints(mechanism):
         lines.append(f"joints = [{', '.join(map(_quote, reading.joints))}]")
+    if reading.velocities:
+        lines.append(f"velocities = [{', '.join(map(_quote, reading.velocities))}]")
     if reading.band is not None:
         lines.append(
             f"band = {reading.band!r}            # Hz; above it forces are ripple or noise"

@@ -22,7 +22,10 @@ FILTERS = (int(mujoco.mjtDyn.mjDYN_FILTER), int(mujoco.mjtDyn.mjDYN_FILTEREXACT)
 HISTORY_TOLERANCE = 1e-9
 """Rounding error allowed between a delay and the history that holds it, as a share of a
 timestep."""
-EXPECTED = "expected <motor>, <position>, or <general> with a fixed gain"
+VELOCITY_SERVO = "velocity servo"
+"""Type of component whose force falls with speed."""
+EXPECTED_TYPE = f'expected type = "{VELOCITY_SERVO}"'
+EXPECTED = "expected <motor>, <position>, <velocity>, or <general> with a fixed gain"
 
 
 def lies_at_command(model: mujoco.MjModel, number: int) -> bool:
@@ -84,6 +87,47 @@ def rest_position(model: mujoco.MjModel, number: int) -> dict[str, float]:
     return parameters | ({} if offset == 0.0 else {"offset": offset})
 
 
+def is_dc_motor(model: mujoco.MjModel, number: int) -> bool:
+    """Return whether an actuator is a DC motor, whose command is a voltage."""
+    return int(model.actuator_gaintype[number]) == DC_MOTOR
+
+
+def falls_with_speed(model: mujoco.MjModel, number: int) -> bool:
+    """Return whether an actuator's force depends on its command and on velocity alone."""
+    if is_dc_motor(model, number):
+        return True
+    affine = int(model.actuator_biastype[number]) == AFFINE
+    return affine and model.actuator_biasprm[number, 1] == 0.0 < -model.actuator_biasprm[number, 2]
+
+
+def velocity_law(model: mujoco.MjModel, number: int) -> tuple[float, float]:
+    """Return gain and damping of an actuator whose force falls with speed.
+
+    In steady state at the voltage u, MuJoCo's DC motor exerts
+    force = gear · K/R · u − (gear · K)²/R · speed, with the resistance R = gainprm₀ and the motor
+    constant K = gainprm₁. Any other such actuator exerts gear · gain · command + gear² · bias₂ ·
+    speed, where a <velocity> has gain = −bias₂ = kv (MuJoCo documentation, "Actuation model").
+
+    Parameters
+    ----------
+    model
+        Compiled MJCF.
+    number
+        Index of the actuator.
+
+    Returns
+    -------
+    tuple of two numbers
+        Force per command, N or Nm, and force per speed, Ns/m or Nms/rad.
+    """
+    gain, gear = model.actuator_gainprm[number], float(model.actuator_gear[number, 0])
+    if is_dc_motor(model, number):
+        resistance, constant = float(gain[0]), gear * float(gain[1])
+        return constant / resistance, constant**2 / resistance
+    # The actuator's speed is gear · joint speed, and its force acts through the gear again.
+    return gear * float(gain[0]), -float(model.actuator_biasprm[number, 2]) * gear**2
+
+
 def find_obstacle(model: mujoco.MjModel, number: int, kind: str) -> str | None:
     """Return the first property of an actuator that a component of this type cannot express.
 
@@ -94,7 +138,7 @@ def find_obstacle(model: mujoco.MjModel, number: int, kind: str) -> str | None:
     number
         Index of the actuator.
     kind
-        Type of the component: force actuator, servo or position actuator.
+        Type of the component: force actuator, servo, velocity servo or position actuator.
 
     Returns
     -------
@@ -121,7 +165,7 @@ def find_obstacle(model: mujoco.MjModel, number: int, kind: str) -> str | None:
                 f"its {attribute} is {values[number]:g}; expected 0, and the {attribute} at the "
                 "joint that it moves"
             )
-    return _find_in_gain(model, number) or _find_in_bias(model, number, kind)
+    return _find_in_gain(model, number, kind) or _find_in_bias(model, number, kind)
 
 
 def _find_in_timing(model: mujoco.MjModel, number: int) -> str | None:
@@ -143,10 +187,10 @@ def _find_in_timing(model: mujoco.MjModel, number: int) -> str | None:
     return f"its activation dynamics are dyntype {name}; expected none, filter or filterexact"
 
 
-def _find_in_gain(model: mujoco.MjModel, number: int) -> str | None:
+def _find_in_gain(model: mujoco.MjModel, number: int, kind: str) -> str | None:
     gain = int(model.actuator_gaintype[number])
     if gain == DC_MOTOR:
-        return _dc_motor(model, number)
+        return _find_in_dc_motor(model, number, kind)
     # Without its terms in length and velocity an affine gain is a fixed one.
     depends_on_motion = model.actuator_gainprm[number, 1:3].any()
     if gain == FIXED or (gain == AFFINE_GAIN and not depends_on_motion):
@@ -156,34 +200,30 @@ def _find_in_gain(model: mujoco.MjModel, number: int) -> str | None:
     return f"its gaintype is {name}, force per command {cause}; {EXPECTED}"
 
 
-def _dc_motor(model: mujoco.MjModel, number: int) -> str:
-    """Return what to write in place of a DC motor.
-
-    In steady state at the voltage u, MuJoCo's DC motor exerts
-    force = gear · K/R · u − (gear · K)²/R · speed, with the resistance R = gainprm₀ and the motor
-    constant K = gainprm₁.
-    """
-    resistance, constant = (float(value) for value in model.actuator_gainprm[number, :2])
-    gear = float(model.actuator_gear[number, 0])
-    problem = "it is a <dcmotor>, whose force falls with speed"
+def _find_in_dc_motor(model: mujoco.MjModel, number: int, kind: str) -> str | None:
     # Inductance, cogging, thermal and current-limit parameters invalidate the steady-state law.
     plain = (
-        resistance > 0.0
+        model.actuator_gainprm[number, 0] > 0.0
         and not model.actuator_gainprm[number, 2:].any()
         and not model.actuator_biasprm[number].any()
         and not model.actuator_dynprm[number].any()
     )
     if not plain:
-        return f"{problem}; {EXPECTED}"
-    return (
-        f'{problem}; expected <motor gear="{gear * constant / resistance:.6g}"> with '
-        f"{(gear * constant) ** 2 / resistance:.6g} more damping at its joint (the back-EMF)"
-    )
+        return (
+            "it is a <dcmotor> with more than a resistance and a motor constant; expected these "
+            "two alone"
+        )
+    return None if kind == VELOCITY_SERVO else f"it is a <dcmotor>; {EXPECTED_TYPE}"
 
 
 def _find_in_bias(model: mujoco.MjModel, number: int, kind: str) -> str | None:
     bias_type, bias = int(model.actuator_biastype[number]), model.actuator_biasprm[number]
-    if bias_type == NO_BIAS or (bias_type == AFFINE and not bias[:3].any()):
+    # The bias of a DC motor is its back-EMF, which belongs to its gain.
+    if (
+        is_dc_motor(model, number)
+        or bias_type == NO_BIAS
+        or (bias_type == AFFINE and not bias[:3].any())
+    ):
         return None
     if bias_type != AFFINE:
         name = mujoco.mjtBias(bias_type).name.removeprefix("mjBIAS_").lower()
@@ -195,10 +235,8 @@ def _find_in_bias(model: mujoco.MjModel, number: int, kind: str) -> str | None:
         return problem if bias[2] > 0.0 else None
     if bias[1] != 0.0:
         return f'its force depends on position, {bias[1]:g} (biasprm); expected type = "servo"'
-    # The actuator's speed is gear · joint speed and its force acts through the gear again, hence
-    # gear² in the equivalent damping of the joint.
-    gear = float(model.actuator_gear[number, 0])
-    return (
-        f"its force depends on speed, {bias[2]:g} (biasprm, as <velocity> has it); expected "
-        f"<motor> with {-bias[2] * gear * gear:g} more damping at its joint"
-    )
+    if bias[2] > 0.0:
+        return f"its force grows with speed, {bias[2]:g} (biasprm); expected 0 or a negative number"
+    if kind == VELOCITY_SERVO:
+        return None
+    return f"its force depends on speed, {bias[2]:g} (biasprm); {EXPECTED_TYPE}"

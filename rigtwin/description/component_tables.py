@@ -12,6 +12,7 @@ from rigtwin import components
 from rigtwin.components import KINDS, UNLIMITED
 from rigtwin.components.quantity import Quantity, fields
 from rigtwin.components.sensors import MEASURES
+from rigtwin.description.actuator_law import VELOCITY_SERVO
 from rigtwin.description.machine import Component, ReplayOf
 from rigtwin.description.mechanism import Mechanism
 from rigtwin.description.mistakes import Mistakes, suggest
@@ -28,6 +29,7 @@ TYPES: dict[str, type] = {
     "schedule": components.Schedule,
     "force actuator": components.ForceActuator,
     "servo": components.Servo,
+    VELOCITY_SERVO: components.VelocityServo,
     "position actuator": components.PositionActuator,
     "position sensor": components.PositionSensor,
     "velocity sensor": components.VelocitySensor,
@@ -48,7 +50,7 @@ SENSED = {name: MEASURES[of] for name, of in TYPES.items() if of in MEASURES}
 """Type of sensor → what it measures."""
 WHOLE = ("body", "base")
 """Types that stand for a whole body and therefore have no coordinate."""
-PUSHING = ("force actuator", "servo")
+PUSHING = ("force actuator", "servo", VELOCITY_SERVO)
 """Types that exert a force on a joint, whose motion follows by forward dynamics."""
 MOVING = (*PUSHING, "position actuator", "motor", "cylinder")
 """Types that take a command."""
@@ -68,7 +70,7 @@ AT: dict[str, tuple[str, ...]] = {
     "schedule": ("joint",),
     "tyre": ("contact",),
     "cylinder": ("joint", "actuator"),
-    **dict.fromkeys(("servo", "position actuator", "motor"), ("actuator",)),
+    **dict.fromkeys(("servo", VELOCITY_SERVO, "position actuator", "motor"), ("actuator",)),
     # A force on a joint that the model has no actuator for, such as that of a hand.
     "force actuator": ("actuator", "joint"),
     **dict.fromkeys(SENSED, ("sensor", "joint", "tendon")),
@@ -240,7 +242,10 @@ class Components:
         if element == "joint" or (element == "tendon" and self._mechanism.acts_on(element, mjcf)):
             return "guide"
         if element == "actuator":
-            return "position actuator" if self._mechanism.positions(mjcf) else "force actuator"
+            if self._mechanism.positions(mjcf):
+                return "position actuator"
+            falls = self._mechanism.falls_with_speed(mjcf)
+            return VELOCITY_SERVO if falls else "force actuator"
         if element == "sensor" and (measures := self._mechanism.measures(mjcf)):
             return f"{measures} sensor"
         self.mistakes.note(where, f"{element} {mjcf!r} needs a type; there are {', '.join(TYPES)}")
@@ -367,7 +372,7 @@ class Components:
             return component
         if kind == "position actuator":
             component = component._replace(**self._mechanism.rest_position(mjcf))
-        elif kind == "force actuator":
+        elif kind in ("force actuator", VELOCITY_SERVO):
             constant, limit = self._mechanism.force_per_command(mjcf)
             # Below zero, a positive command pushes towards negative positions.
             if constant == 0.0:
@@ -376,7 +381,12 @@ class Components:
                     f"actuator {mjcf!r} has gear times gain 0; expected another number",
                 )
                 return None
-            component = component._replace(constant=constant, force_limit=min(limit, UNLIMITED))
+            component = component._replace(force_limit=min(limit, UNLIMITED))
+            if kind == VELOCITY_SERVO:
+                gain, damping = self._mechanism.velocity_law(mjcf)
+                component = component._replace(velocity_gain=gain, damping_gain=damping)
+            else:
+                component = component._replace(constant=constant)
         elif kind == "servo":
             component = component._replace(**self._servo(where, mjcf))
         if kind in (*PUSHING, "position actuator"):

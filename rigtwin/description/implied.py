@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from rigtwin.description.actuator_law import VELOCITY_SERVO
 from rigtwin.description.coupling import are_coupled
 from rigtwin.description.joint_elements import (
     actuator_name,
@@ -29,12 +30,13 @@ TESTS = {
     INVERSE: "the joints move as measured, and the forces that this takes are predicted",
     POSITIONS: "each joint follows its command, nominally at once, and its position is predicted",
     SERVOS: "MuJoCo's position actuators push the joints, and their positions are predicted",
-    FORCES: "commanded forces push the joints, and their positions are predicted",
+    FORCES: "commanded forces, velocities or voltages drive the joints, and their positions are "
+    "predicted",
 }
 """Kind of test → its inputs and its predicted signals."""
 MOVERS = {POSITIONS: "position actuator", SERVOS: "servo", FORCES: "force actuator"}
 """Kind of test → type of the components that take its commands."""
-KEYS = ("test", "joints")
+KEYS = ("test", "joints", "velocities")
 """Keys of a replay whose components are implied."""
 PRESCRIBED = [
     "coulomb",
@@ -157,6 +159,13 @@ def _expand_replay(
     if test in (POSITIONS, SERVOS) and missing:
         mistakes.note(where, f"test = {test!r}: joint {missing[0]} has no position actuator")
         return
+    velocities = table.get("velocities", [])
+    if velocities and test != FORCES:
+        mistakes.note(where, f"velocities: with test = {test!r} positions are measured")
+        return
+    if not isinstance(velocities, list) or not set(map(str, velocities)) <= set(joints):
+        mistakes.note(where, f"velocities = {str(velocities)[:40]}: expected a list of joints")
+        return
     keys = {key: value for key, value in table.items() if key not in KEYS}
     # Joints under position commands follow them whatever the load: coupling has no influence.
     together = test != POSITIONS and are_coupled(mechanism, joints)
@@ -165,7 +174,8 @@ def _expand_replay(
         # One table becomes several replays, which need names of their own.
         group_keys = keys if len(groups) == 1 else {**keys, "name": identifier(group[0])}
         group_keys.setdefault("name", "all joints" if together else identifier(group[0]))
-        _add_group(test, group, group_keys, mechanism, implied, swinging(mechanism, joints))
+        free = swinging(mechanism, joints)
+        _add_group(test, group, group_keys, mechanism, implied, free, velocities)
 
 
 def _add_group(
@@ -175,27 +185,32 @@ def _add_group(
     mechanism: Mechanism,
     implied: Implied,
     free: Sequence[str],
+    velocities: Sequence[str],
 ) -> None:
     """Add the components of joints that are replayed together, and their replay.
 
-    `free` are the joints that swing freely.
+    `free` are the joints that swing freely, and `velocities` those whose velocity is measured in
+    place of their position.
     """
     tables = implied.components
-    positions = [sensor_name(mechanism, joint, "position") for joint in joints]
-    for joint, name in zip(joints, positions, strict=True):
-        # The measured positions are the reference of the test: errors of their sensors would be
+    sensors: list[str] = []
+    for joint in joints:
+        measured = "velocity" if joint in velocities else "position"
+        name = sensor_name(mechanism, joint, measured)
+        sensors.append(name)
+        # The measured motions are the reference of the test: errors of their sensors would be
         # confounded with effects of the joints.
-        tables[name] = _sensor(mechanism, joint, "position") | {"effects": []}
+        tables[name] = _sensor(mechanism, joint, measured) | {"effects": []}
     if test != POSITIONS:
         for joint in joints:
             # Position commands move the joint whatever the load, so its friction cannot be seen.
             tables[identifier(joint)] = {"joint": joint}
     if test == INVERSE:
         forces = _add_forces(joints, mechanism, tables)
-        implied.replays.append({**keys, "moved_by": positions, "observe": forces})
+        implied.replays.append({**keys, "moved_by": sensors, "observe": forces})
         return
     movers = _add_movers(test, joints, mechanism, tables, free)
-    replay = {**keys, "moved_by": movers, "observe": positions}
+    replay = {**keys, "moved_by": movers, "observe": sensors}
     if test != POSITIONS and len(joints) > 1:
         replay["free"] = list(joints)
         _add_free_joints(joints, mechanism, tables, free)
@@ -204,9 +219,10 @@ def _add_group(
     elif test != POSITIONS:
         _add_mass(mechanism, joints[0], tables)
         _add_rotor(joints[0], tables)
-        if test == FORCES and any(mechanism.joint(joints[0]).gravity):
+        weighs = any(mechanism.joint(joints[0]).gravity) and joints[0] not in velocities
+        if test == FORCES and weighs:
             # The gravity load depends on the true angle, which makes the encoder's zero observable.
-            tables[positions[0]]["effects"] = ["offset"]
+            tables[sensors[0]]["effects"] = ["offset"]
     implied.replays.append(replay)
 
 
@@ -242,7 +258,11 @@ def _add_movers(
     for joint in joints:
         actuator, name = actuator_on(mechanism, joint), actuator_name(mechanism, joint)
         if actuator is not None:
-            tables[name] = {"actuator": actuator, "type": MOVERS[test]}
+            falls = test == FORCES and mechanism.falls_with_speed(actuator)
+            tables[name] = {
+                "actuator": actuator,
+                "type": VELOCITY_SERVO if falls else MOVERS[test],
+            }
             movers.append(name)
         elif joint in free:
             tables[name] = {"joint": joint, "type": MOVERS[test], "effects": []}

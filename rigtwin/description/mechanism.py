@@ -10,10 +10,13 @@ import mujoco
 import numpy as np
 
 from rigtwin.description.actuator_law import (
+    falls_with_speed,
     find_obstacle,
+    is_dc_motor,
     lies_at_command,
     read_timing,
     rest_position,
+    velocity_law,
 )
 from rigtwin.description.closed_loops import refuse_closed_loops
 from rigtwin.description.machine import Joint
@@ -202,6 +205,18 @@ class Mechanism:
     def positions(self, name: str) -> bool:
         """Return whether an actuator takes a position as its command."""
         return lies_at_command(self.model, self.number("actuator", name))
+
+    def falls_with_speed(self, name: str) -> bool:
+        """Return whether an actuator's force depends on its command and on velocity alone."""
+        return bool(name) and falls_with_speed(self.model, self.number("actuator", name))
+
+    def is_dc_motor(self, name: str) -> bool:
+        """Return whether an actuator is a DC motor, whose command is a voltage."""
+        return bool(name) and is_dc_motor(self.model, self.number("actuator", name))
+
+    def velocity_law(self, name: str) -> tuple[float, float]:
+        """Return gain and damping of an actuator whose force falls with speed."""
+        return velocity_law(self.model, self.number("actuator", name))
 
     def actuator_timing(self, name: str) -> dict[str, float]:
         """Return delay and lag of an actuator's command, s; see `actuator_law.read_timing`."""

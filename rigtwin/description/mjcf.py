@@ -13,7 +13,7 @@ from xml.parsers import expat
 import mujoco
 import numpy as np
 
-from rigtwin.components import ForceActuator, Guide, Mass, Rail, Rotor, Servo, component_of
+from rigtwin.components import SERVOS, ForceActuator, Guide, Mass, Rail, Rotor, Servo, component_of
 from rigtwin.components.quantity import UNLIMITED
 from rigtwin.components.servo import PUSHERS, pusher_of
 from rigtwin.description.machine import Component, Machine
@@ -269,6 +269,9 @@ def _apply_to_actuator(
     of = component.component_type
     if change.parameter == "delay":
         _set_delay(document, tag, model, number, change.value)
+    elif change.parameter == "gains" and tag.name == "velocity":
+        # The tag's kv is both gains.
+        document.set(tag, "kv", _number(change.value * float(model.actuator_gainprm[number, 0])))
     elif change.parameter == "gains" and tag.name == "position":
         if "dampratio" in tag.attributes:
             return False
@@ -298,8 +301,9 @@ def _apply_to_actuator(
         # joint, so forcerange is divided by the new gear.
         limit = values.get("force_limit", nominal.force_limit)
         _set_force_limit(document, tag, limit / abs(float(gear[0])), limit)
-    elif change.parameter == "force_limit" and of is Servo:
-        _set_force_limit(document, tag, change.value, change.value)
+    elif change.parameter == "force_limit" and of in SERVOS:
+        gear = abs(float(model.actuator_gear[number, 0]))
+        _set_force_limit(document, tag, change.value / gear, change.value)
     else:
         return False
     return True

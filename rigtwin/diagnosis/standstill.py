@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rigtwin.components import PUSHERS, ForceActuator, Guide, Pusher
+from rigtwin.components import PUSHERS, Guide, Pusher
 from rigtwin.components.plant import parameter_of
-from rigtwin.components.servo import pusher_of
+from rigtwin.components.servo import push_all, push_law, pusher_of
 from rigtwin.description.machine import Machine, ReplayOf, Row
 from rigtwin.diagnosis.units import say
 from rigtwin.diagnosis.words import name_part
@@ -151,9 +151,7 @@ def _is_still(position: Array) -> bool:
 
 def _push(actuator: Pusher, command: Array, position: Array) -> float:
     """Return the largest change of force with which an actuator pushed, N."""
-    if isinstance(actuator, ForceActuator):
-        force = actuator.constant * actuator.gain * command
-    else:
-        force = actuator.position_gain * (command - position)
-    limit = actuator.force_limit
-    return float(np.max(np.abs(np.clip(force, -limit, limit))))
+    forces = push_all(
+        push_law(actuator), actuator.gain * command, position, np.zeros_like(position)
+    )
+    return float(np.max(np.abs(forces)))

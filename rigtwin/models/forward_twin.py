@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rigtwin.components import UNLIMITED, Mass, Servo, component_of
+from rigtwin.components import SERVOS, UNLIMITED, Mass, component_of
 from rigtwin.components.conditioning import actuator
 from rigtwin.components.plant import Plant
 from rigtwin.components.sensors import apply_sensor, sensor_of
@@ -119,7 +119,7 @@ class ForwardDynamicsTwin(CoupledJoints):
     def _drive(self, plant: Plant, name: str, h: float) -> SteppedActuator:
         mover = pusher_of(plant, name)
         model = actuator(mover, plant.computer, h)
-        if isinstance(mover, Servo):
+        if isinstance(mover, SERVOS):
             return SteppedActuator(model, 1.0, UNLIMITED, True, self._layout.servos.index(name))
         limit = self._drives.force_limit(plant, name)
         return SteppedActuator(

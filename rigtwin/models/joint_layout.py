@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rigtwin.components import Base, Body, ForceActuator, Guide, Rotor, Servo, component_of
+from rigtwin.components import SERVOS, Base, Body, ForceActuator, Guide, Rotor, component_of
 from rigtwin.components.body import list_parameters, list_surplus, turn_gravity
 from rigtwin.components.plant import Plant, select
 from rigtwin.description.machine import Machine, ReplayOf
@@ -44,7 +44,7 @@ class JointLayout:
         components = machine.components
         movers = [(name, components[name].component_type) for name in replay.moved_by]
         self.pushers = [name for name, of in movers if of is ForceActuator]
-        self.servos = [name for name, of in movers if of is Servo]
+        self.servos = [name for name, of in movers if of in SERVOS]
         self.leaders = [n for n in replay.moved_by if n not in (*self.pushers, *self.servos)]
         joints = [*replay.free, *(components[name].joint for name in self.leaders)]
         guides, rotors = machine.components_of(Guide), machine.components_of(Rotor)

@@ -30,7 +30,7 @@ from rigtwin.components.guide import damping
 from rigtwin.components.guide_step import GuideStep
 from rigtwin.components.mount import MountState, give_way
 from rigtwin.components.sensors import Transducer, TransducerState, transduce
-from rigtwin.components.servo import Play, Push, pull, push
+from rigtwin.components.servo import Play, Push, depends_on_motion, pull, push
 from rigtwin.models.joint_step import step_behind_play, step_joint
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import loop_kernel
@@ -167,7 +167,7 @@ def push_joint(
     """
     law = drive.law
     wanted = condition(drive.conditioning, drive.held, command)
-    if law.position_gain <= 0.0:
+    if not depends_on_motion(law):
         force = push(law, wanted, x, v)
         return 0.5 * (last + force), 0.0, force
     pushed, held_by = pull(law, 0.5 * (last + wanted), x), law.damping_gain
@@ -216,7 +216,7 @@ def integrate_pushed(
     behind = MountState(x, 0.0, slider, viscous)
     law, mass, rotor = drive.law, inertia.mass, start
     plays = drive.play.half > 0.0
-    follows = law.position_gain > 0.0
+    follows = depends_on_motion(law)
     # What the step before leaves: a servo's conditioned command, or a force actuator's force.
     last = drive.held.memory[3] if follows else 0.0
     # A mount whose oscillation with the mass is faster than the step, c·m < h², counts as rigid.

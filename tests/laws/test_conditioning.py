@@ -5,7 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rigtwin.components import UNLIMITED, Computer, Cylinder, ForceActuator, Motor, Servo
+from rigtwin.components import (
+    UNLIMITED,
+    Computer,
+    Cylinder,
+    ForceActuator,
+    Motor,
+    Servo,
+    VelocityServo,
+)
 from rigtwin.components.conditioning import actuator, condition, condition_all, hold, limit
 from tests.laws.written import law_of
 
@@ -14,8 +22,8 @@ TIME = STEP * np.arange(400)
 SWING = 1.2 * np.sin(2.0 * np.pi * 5.0 * TIME)
 JUMP = np.where(TIME < 0.1, 0.2, 1.0)
 RAMP = 0.3 + 2.0 * np.maximum(TIME - 0.05, 0.0)
-ACTUATORS = [Motor(), Cylinder(), ForceActuator(), Servo()]
-THRESHOLDS = [Motor(), ForceActuator()]
+ACTUATORS = [Motor(), Cylinder(), ForceActuator(), Servo(), VelocityServo()]
+THRESHOLDS = [Motor(), ForceActuator(), VelocityServo()]
 """Actuators whose deadband lies about zero."""
 
 
@@ -37,9 +45,9 @@ def test_a_nominal_actuator_passes_commands_as_they_are(component):
     [
         *(of._replace(**{name: value}) for of in ACTUATORS for name, value in
           (("delay", 1e-3), ("gain", 1.1), ("lag", 1e-3))),
-        *(of._replace(**{name: 0.1}) for of in (Motor(), Cylinder(), ForceActuator())
+        *(of._replace(**{name: 0.1}) for of in (Cylinder(), *THRESHOLDS)
           for name in ("deadband", "saturation")),
-        *(of._replace(rate_limit=1.0) for of in (Motor(), ForceActuator(), Servo())),
+        *(of._replace(rate_limit=1.0) for of in (Servo(), *THRESHOLDS)),
         ForceActuator(gain_asymmetry=0.1),
         ForceActuator(deadband_asymmetry=0.1),
     ],
@@ -57,7 +65,7 @@ def test_a_command_that_is_held_for_long_has_settled():
     assert plate == pytest.approx(np.full(5, 1.1 * 0.9))
 
 
-@law_of("gain", Motor, Cylinder, ForceActuator, Servo)
+@law_of("gain", Motor, Cylinder, ForceActuator, Servo, VelocityServo)
 @pytest.mark.parametrize("component", ACTUATORS)
 @pytest.mark.parametrize("gain", [0.8, 1.07])
 def test_a_gain_multiplies_the_command(component, gain):
@@ -72,7 +80,7 @@ def test_a_gain_differs_by_half_its_asymmetry_each_way():
         assert passed(uneven, size * SWING) == pytest.approx(expected, abs=1e-12)
 
 
-@law_of("lag", Motor, Cylinder, ForceActuator, Servo)
+@law_of("lag", Motor, Cylinder, ForceActuator, Servo, VelocityServo)
 @pytest.mark.parametrize("component", ACTUATORS)
 @pytest.mark.parametrize("lag", [0.004, 0.03])
 def test_a_lag_answers_a_jump_with_an_exponential(component, lag):
@@ -82,7 +90,7 @@ def test_a_lag_answers_a_jump_with_an_exponential(component, lag):
     assert passed(component._replace(lag=lag), JUMP) == pytest.approx(expected, abs=1e-9)
 
 
-@law_of("delay", Motor, Cylinder, ForceActuator, Servo, Computer)
+@law_of("delay", Motor, Cylinder, ForceActuator, Servo, VelocityServo, Computer)
 @pytest.mark.parametrize("component", ACTUATORS)
 @pytest.mark.parametrize(("own", "late"), [(0.0035, 0.0), (0.0, 0.0102), (0.002, 0.003)])
 def test_a_delay_of_actuator_and_computer_shifts_the_command(component, own, late):
@@ -92,15 +100,15 @@ def test_a_delay_of_actuator_and_computer_shifts_the_command(component, own, lat
     assert found[80:] == pytest.approx(expected[80:])
 
 
-@law_of("saturation", Motor, Cylinder, ForceActuator)
-@pytest.mark.parametrize("component", [Motor(), Cylinder(), ForceActuator()])
+@law_of("saturation", Motor, Cylinder, ForceActuator, VelocityServo)
+@pytest.mark.parametrize("component", [Cylinder(), *THRESHOLDS])
 def test_a_saturation_limits_both_signs(component):
     found = passed(component._replace(saturation=0.7), SWING)
     assert found == pytest.approx(np.clip(SWING, -0.7, 0.7))
 
 
-@law_of("rate_limit", Motor, ForceActuator, Servo)
-@pytest.mark.parametrize("component", [Motor(), ForceActuator(), Servo()])
+@law_of("rate_limit", Motor, ForceActuator, Servo, VelocityServo)
+@pytest.mark.parametrize("component", [*THRESHOLDS, Servo()])
 def test_a_rate_limit_lets_the_output_climb_at_that_rate(component):
     found = passed(component._replace(rate_limit=4.0), JUMP)
     since = np.maximum(TIME + STEP - 0.1, 0.0)
@@ -108,7 +116,7 @@ def test_a_rate_limit_lets_the_output_climb_at_that_rate(component):
     assert passed(component._replace(rate_limit=4.0), 1.2 - JUMP) == pytest.approx(1.2 - found)
 
 
-@law_of("deadband", Motor, ForceActuator)
+@law_of("deadband", Motor, ForceActuator, VelocityServo)
 @pytest.mark.parametrize("component", THRESHOLDS)
 def test_a_deadband_about_zero_takes_its_width_off_the_command(component):
     found = passed(component._replace(deadband=0.3), SWING)
@@ -142,7 +150,7 @@ def test_a_deadband_reaches_half_its_asymmetry_further_one_way(band, more, upper
     assert found == pytest.approx(expected)
 
 
-@pytest.mark.parametrize("kind", [ForceActuator, Servo])
+@pytest.mark.parametrize("kind", [ForceActuator, Servo, VelocityServo])
 def test_a_command_is_limited_before_anything_else(kind):
     limited = kind(command_low=-0.5, command_high=0.9)
     assert passed(limited, SWING) == pytest.approx(np.clip(SWING, -0.5, 0.9))

@@ -29,6 +29,7 @@ from rigtwin.components import (
     Servo,
     Tyre,
     VelocitySensor,
+    VelocityServo,
 )
 
 NO_LIMIT = 1e9
@@ -102,6 +103,16 @@ NOMINAL: dict[type, dict[str, float]] = {
     },
     Tyre: {"stiffness": 50_000.0, "hardening_power": 1.0},
     VelocitySensor: {"gain": 1.0},
+    VelocityServo: {
+        "velocity_gain": 1.0,
+        "damping_gain": 1.0,
+        "force_limit": NO_LIMIT,
+        "gain": 1.0,
+        "gains": 1.0,
+        "saturation": NO_LIMIT,
+        "rate_limit": NO_LIMIT,
+        **RANGE,
+    },
 }
 """Component type → its nominal values that are not zero."""
 PARTS = {

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from rigtwin.components import ForceActuator, Guide, Servo
+from rigtwin.components import ForceActuator, Guide, Servo, VelocityServo
 from rigtwin.components.servo import pull, push, push_all, push_law
 from tests.laws.joints import PERIOD, motion_under
 from tests.laws.written import law_of
@@ -45,6 +45,37 @@ def test_a_servo_pushes_by_its_error_less_its_damping_within_its_limit(servo, st
     assert push(law, command, position, speed) == pytest.approx(expected)
     pulled = servo.gains * servo.position_gain * beyond
     assert pull(law, command, position) == pytest.approx(pulled)
+
+
+@law_of("gains", VelocityServo)
+@law_of("force_limit", VelocityServo)
+@pytest.mark.parametrize(
+    "servo",
+    [
+        VelocityServo(),
+        VelocityServo(velocity_gain=80.0, damping_gain=0.0),
+        VelocityServo(velocity_gain=-80.0, damping_gain=3.0),
+        VelocityServo(velocity_gain=80.0, damping_gain=30.0, force_limit=12.0, gains=1.7),
+    ],
+)
+@pytest.mark.parametrize("state", STATES)
+def test_a_velocity_servo_pushes_by_its_command_less_its_damping_within_its_limit(servo, state):
+    """F = g (k u − d v) within ± limit, wherever the joint is."""
+    command, position, speed = state
+    force = servo.gains * (servo.velocity_gain * command - servo.damping_gain * speed)
+    expected = min(max(force, -servo.force_limit), servo.force_limit)
+    assert push(push_law(servo), command, position, speed) == pytest.approx(expected)
+
+
+@law_of("gains", VelocityServo)
+def test_a_mass_under_a_velocity_servo_gains_speed_as_a_first_order_lag():
+    """m v' = g (k u − d v): v = k u / d (1 − exp(−g d t / m)), and x is its integral."""
+    mass, gain, damper, gains = 2.0, 30.0, 12.0, 1.5
+    servo = VelocityServo(velocity_gain=gain, damping_gain=damper, gains=gains)
+    position = motion_under(Guide(), np.full(800, 0.05), mass, servo, steps=8)[0]
+    time, decay = PERIOD * np.arange(800), gains * damper / mass
+    expected = 0.05 * gain / damper * (time - (1.0 - np.exp(-decay * time)) / decay)
+    np.testing.assert_allclose(position, expected, atol=1e-3 * expected[-1])
 
 
 @pytest.mark.parametrize("state", STATES)
