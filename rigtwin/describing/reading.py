@@ -19,6 +19,7 @@ from rigtwin.describing.position_signals import ask_positions, position_signals
 from rigtwin.describing.quantity import JointQuantity
 from rigtwin.describing.question import Question, enumerate_names, option
 from rigtwin.describing.replay_kind import ReplayKind, choose_kind, free_swing
+from rigtwin.describing.schedule_signals import ScheduleColumn, schedule_columns
 from rigtwin.describing.signal import LogSignal
 from rigtwin.describing.slots import Slots
 from rigtwin.describing.velocity_signals import integrate, joints_by_velocity, velocity_signals
@@ -56,6 +57,8 @@ class Reading:
         Joints whose actuator does nothing throughout.
     velocities
         Joints whose velocity was measured in place of their position.
+    schedules
+        Columns that friction or a force may follow.
     band
         Frequency up to which forces are judged, Hz; None where all is judged.
     """
@@ -68,6 +71,7 @@ class Reading:
     notes: tuple[str, ...] = ()
     idle: tuple[str, ...] = ()
     velocities: tuple[str, ...] = ()
+    schedules: tuple[ScheduleColumn, ...] = ()
     band: float | None = None
 
 
@@ -112,17 +116,24 @@ def read_log(
         log.notes.append(f"{measured} have the signs of the log")
     idle = [signal.joint for signal in movers if not np.any(log.values(signal))]
     band = _band(log, kind.test, values)
+    unused = _unused(log, signals, matches)
+    schedules = schedule_columns(log, joints, {*log.columns.values} - {*unused})
     return Reading(
         clock=log.clock,
         kind=kind,
         joints=tuple(joints),
         signals=tuple(signals),
-        unused=_unused(log, signals, matches),
+        unused={name: why for name, why in unused.items() if name not in _names(schedules)},
         notes=tuple(log.notes),
         idle=tuple(idle) if kind.test == FORCES else (),
         velocities=tuple(velocities),
+        schedules=schedules,
         band=band,
     )
+
+
+def _names(schedules: Sequence[ScheduleColumn]) -> list[str]:
+    return [schedule.column for schedule in schedules]
 
 
 def _motions(log: Log) -> dict[str, LogSignal]:

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from rigtwin.describing.formulas import read_formula
 from rigtwin.describing.quantity import JointQuantity
 from rigtwin.describing.reading import Reading
+from rigtwin.describing.schedule_signals import ScheduleColumn
 from rigtwin.describing.signal import LogSignal
 from rigtwin.description.implied import FORCES, INVERSE, TESTS
 from rigtwin.description.joint_elements import (
@@ -87,6 +88,9 @@ def write_description(
         for signal in reading.signals
         if signal.quantity is JointQuantity.FORCE and signal.formula
     ]
+    # Only where the motion is given can a force follow a channel.
+    followed = [each for each in reading.schedules if each.joint and kind.test == INVERSE]
+    believed += [_schedule(each) for each in followed]
     if believed:
         lines += ["", "[components]", *believed]
     lines += [
@@ -95,6 +99,13 @@ def write_description(
     ]
     lines += _examples(mechanism, reading)
     return "\n".join(lines) + "\n"
+
+
+def _schedule(schedule: ScheduleColumn) -> str:
+    """Table of a component whose forces follow a column."""
+    keys = [f"joint = {_quote(schedule.joint)}", 'type = "schedule"']
+    keys += [f"unit = {_quote(schedule.unit)}"] if schedule.unit else []
+    return f"{schedule.name} = {{ {', '.join(keys)} }}    # forces may follow it"
 
 
 def _examples(mechanism: Mechanism, reading: Reading) -> list[str]:
@@ -178,6 +189,10 @@ def write_map(
         named |= used
         remarks = "; ".join([signal.why, *signal.assumed])
         channels.append(f"{_quote(channel_of(mechanism, signal))} = {text}    # {remarks}")
+    channels += [
+        f'"/sensor.{each.name}" = {{ column = {_quote(each.column)}, unit = "1" }}'
+        for each in reading.schedules
+    ]
     if named:
         lines += ["", "[columns]", *(f"{plain} = {text}" for plain, text in named.items())]
     lines += ["", "[channels]", *channels]
@@ -226,6 +241,16 @@ def table_rows(mechanism: Mechanism, reading: Reading) -> list[Sequence[str]]:
         unit = "" if signal.formula else signal.unit
         channel = channel_of(mechanism, signal)
         rows.append((signal.key, signal.source, unit, channel, "; ".join(remarks)))
+    rows += [
+        (
+            "may be followed",
+            each.column,
+            "",
+            f"/sensor.{each.name}",
+            f"forces at {each.joint or 'a joint'}",
+        )
+        for each in reading.schedules
+    ]
     # Unused columns come last: a reader looks for a column that should have been used.
     rows += [("not used", column, "", "", why) for column, why in reading.unused.items()]
     return rows

@@ -11,7 +11,7 @@ from rigtwin.components import Effect
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.first_look import FirstLook
 from rigtwin.diagnosis.fit import Fit, clashes, is_possible, leave_one_out
-from rigtwin.diagnosis.fitter import Fitter
+from rigtwin.diagnosis.fitter import PERTURBATIONS, Fitter
 from rigtwin.diagnosis.posterior import HypothesisPosterior
 from rigtwin.diagnosis.search import HypothesisSearch
 from rigtwin.diagnosis.threads import Threads
@@ -94,7 +94,9 @@ def explain(
         fit = best
         # A search on thinned ticks is followed by one fit to all of them.
         if best.effects and search.fine.evidence.models is not evidence.models:
-            fit = Fitter(evidence).refit_with_tolerances(best)
+            # Restarts nearby are a search as well, for which no effort may be left.
+            restarts = () if search.ended_early else PERTURBATIONS
+            fit = Fitter(evidence).refit_with_tolerances(best, restarts)
         return Explanation(
             posterior=posterior,
             fit=fit,
@@ -139,7 +141,10 @@ def _nest(search: HypothesisSearch, fit: Fit) -> list[Fit]:
                 continue
             # Most subsets were fitted on the way to the best hypothesis, and need no second fit.
             known = search.pool.get(frozenset(remaining))
-            fewer.append(known.fit if known is not None else search.fine.refine(remaining, values))
+            if known is not None:
+                fewer.append(known.fit)
+            elif not search.ended_early:
+                fewer.append(search.fine.refine(remaining, values))
         if not fewer:
             break
         chain.insert(0, min(fewer, key=lambda fit: fit.misfit))
