@@ -305,9 +305,9 @@ def test_torques_without_a_sign_are_not_taken(tmp_path: Path, motion: Columns):
 
 
 def test_columns_that_are_not_used_stand_in_the_table(tmp_path: Path, motion: Columns):
-    answer = described(tmp_path, {**motion, "temperature": motion["q1"], "battery": motion["q2"]})
+    answer = described(tmp_path, {**motion, "status": motion["q1"], "battery": motion["q2"]})
     assert answer.reading.unused["dq1"] == "the test does not need the velocity"
-    assert {"temperature", "battery"} <= set(answer.reading.unused)
+    assert {"status", "battery"} <= set(answer.reading.unused)
     assert "battery" in str(answer)
 
 

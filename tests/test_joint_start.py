@@ -8,8 +8,12 @@ import numpy as np
 import pytest
 
 import rigtwin
+from rigtwin.components import Guide, component_of, with_parameters
+from rigtwin.description.machine import Machine
 from rigtwin.recording import Recording
 from tests.helpers.coupled import ARM, arm, described, integrate, recording
+from tests.helpers.described import NOISY
+from tests.helpers.described import described as slide
 from tests.helpers.reference import swing_dry
 
 PENDULUM = """<mujoco><compiler angle="radian"/><option gravity="0 0 -9.81"/><worldbody>
@@ -82,3 +86,37 @@ def test_an_arm_that_gyros_alone_see_starts_where_it_did(tmp_path: Path) -> None
     moved = model.move(machine.plant)  # type: ignore[attr-defined]
     assert moved[:2, :, 0] == pytest.approx(np.array(start), abs=2e-2)
     assert np.std(moved[1] - rates) < 5e-3
+
+
+@pytest.fixture(scope="module")
+def pushed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Machine, Recording]:
+    """A slide that a force pushes, whose true start differs from the first noisy samples."""
+    folder = tmp_path_factory.mktemp("slide")
+    machine = slide(folder, "slide", NOISY)
+    return machine, rigtwin.run(machine, "shake", seed=5)
+
+
+@pytest.mark.parametrize("viscous", [1.0, 1.02])
+def test_a_search_corrects_the_start_to_first_order(
+    pushed: tuple[Machine, Recording], viscous: float
+) -> None:
+    machine, seen = pushed
+    model = machine.physics.model(machine, seen.inputs, machine.configuration_of(seen), 4)
+    quick = model.thin(1e-3)
+    assert quick.has_linear_starts
+    assert not model.has_linear_starts
+    nominal = component_of(machine.plant, "guide", Guide)
+    values = {"viscous": viscous * nominal.viscous, "coulomb": 0.1 * (viscous - 1.0)}
+    plant = with_parameters(machine.plant, "guide", values)
+    exact, first_order = model.predict(plant)[0], quick.predict(plant)[0]
+    as_read = quick.move(plant)  # type: ignore[attr-defined]
+    assert as_read.shape == (4, seen.ticks)
+    assert np.std(exact - first_order) < 0.02 * np.std(exact)
+    assert quick.effort < 0.3 * model.effort
+
+
+def test_a_free_swing_keeps_its_fitted_start(tmp_path: Path) -> None:
+    machine = described(tmp_path, "fork", PENDULUM, TOML)
+    seen = swung((0.3, 0.0), 0.0, 0.0)
+    model = machine.physics.model(machine, seen.inputs, machine.configuration_of(seen), 8)
+    assert not model.thin(1e-3).has_linear_starts

@@ -53,6 +53,17 @@ def test_forces_tell_rad_from_degrees(tmp_path: Path, unit: str, drift: float):
     assert "by the forces, which are 1 times the model's" in position.assumed[0]
 
 
+def test_a_torque_in_percent_is_a_question(tmp_path: Path):
+    motion = shaft_motion()
+    log, model = tmp_path / "log.csv", write_shaft(tmp_path)
+    table = np.stack([motion["time"], motion["angle"], 100.0 * motion["torque"]], axis=1)
+    np.savetxt(log, table, delimiter=",", header="time,angle,torque [%]", comments="")
+    with pytest.raises(RigtwinError, match="how much is one percent"):
+        rigtwin.describe(model, log)
+    answer = rigtwin.describe(model, log, columns={"shaft.force": "0.01 * torque"})
+    assert [signal.key for signal in answer.reading.signals] == ["shaft.position", "shaft.force"]
+
+
 def test_forces_that_fit_no_unit_leave_the_question(tmp_path: Path):
     motion = shaft_motion(3.0)
     # Between both units: a torque in Ncm, or behind an unknown gear.

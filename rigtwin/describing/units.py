@@ -25,6 +25,8 @@ SURELY_DEGREES = 45.0
 """Numbers between a turn in rad and this one could be rad or degrees."""
 SURELY_METRES, SURELY_MILLIMETRES = 3.0, 20.0
 """Numbers between these could be m or mm, of a joint without a range."""
+PERCENT = "%"
+"""Unit of a share, as files state it."""
 LARGEST_PERCENT = 100.0
 """Some loggers write shares of a joint's range in percent."""
 ALIKE = 5.0
@@ -69,9 +71,14 @@ def known_unit(columns: Columns, column: str, si: str, key: str) -> Unit | None:
     Raises
     ------
     Question
-        If the file states the unit of another quantity.
+        If the file states the unit of another quantity, or percent.
     """
     written = columns.units.get(column, "")
+    if written == PERCENT:
+        raise ask(
+            f"column {column!r} is in percent, and {key} is in {si}; how much is one percent?",
+            option(key, f"FACTOR * {column}"),
+        )
     if written and is_unit(written) and unit_of(written)[0] != "1":
         if unit_of(written)[0] == si:
             return Unit(written)

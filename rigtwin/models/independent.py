@@ -82,6 +82,10 @@ class IndependentModel(Model[Plant]):
     def effort(self) -> float:
         return sum(each.effort for each in self._joints)
 
+    @property
+    def has_linear_starts(self) -> bool:
+        return any(each.has_linear_starts for each in self._joints)
+
     def halve_steps(self) -> IndependentModel:
         return IndependentModel([each.halve_steps() for each in self._joints])
 

@@ -30,8 +30,10 @@ SMALL = 0.02
 """Size of a small disturbance, as a share of the signal's standard deviation."""
 SHORTEST_END = 20
 """Divisor of a recording's length that gives the largest part left out at each end."""
-STEP_EFFORT = 3e-7
+STEP_EFFORT = 6e-8
 """Estimated processor time of an integration step, s."""
+FITTED_PASSES = 5
+"""Typical number of integrations that a fitted start takes."""
 SEED = 7
 """Seed of the noise that is propagated through the machine."""
 PLACES = {"position": 0, "velocity": 1, "force": 2, "command": 3}
@@ -43,7 +45,7 @@ class JointModel(Model[Plant]):
 
     Parameters
     ----------
-    machine, replay, inputs, configuration, steps, every
+    machine, replay, inputs, configuration, steps, every, linear
         As `JointSimulation` takes them.
 
     Raises
@@ -60,12 +62,13 @@ class JointModel(Model[Plant]):
         configuration: Configuration,
         steps: int,
         every: int = 1,
+        linear: bool = False,
     ) -> None:
         self._machine, self._replay, self._signals = machine, replay, inputs
         self._configuration, self._steps, self.every = configuration, steps, every
         self._period = inputs.period
         self.rows: tuple[Row, ...] = replay.rows
-        self._joint = JointSimulation(machine, replay, inputs, configuration, steps, every)
+        self._joint = JointSimulation(machine, replay, inputs, configuration, steps, every, linear)
         self._smoothed: dict[str, tuple[Array, float]] = {}
         self._band = self._find_band()
 
@@ -96,7 +99,12 @@ class JointModel(Model[Plant]):
     @property
     def effort(self) -> float:
         ticks = self._signals.ticks // self.every
-        return STEP_EFFORT * ticks * (self._steps if self._joint.pushed else 1)
+        passes = FITTED_PASSES if self._joint.may_be_linear and not self._joint.linear else 1
+        return STEP_EFFORT * passes * ticks * (self._steps if self._joint.pushed else 1)
+
+    @property
+    def has_linear_starts(self) -> bool:
+        return self._joint.linear
 
     def halve_steps(self) -> JointModel:
         return self._on_grid(max(1, self._steps // 2), self.every)
@@ -105,15 +113,27 @@ class JointModel(Model[Plant]):
         return self._on_grid(2 * self._steps, self.every)
 
     def thin(self, longest: float) -> JointModel:
-        """Return a model with fewer ticks if a sensor prescribes the motion, or else itself."""
+        """Return a coarser model for a search, or itself.
+
+        It has fewer ticks where a sensor prescribes the motion. Where a force moves the joint,
+        errors of its start are linear.
+        """
+        if self._joint.may_be_linear:
+            return self._on_grid(self._steps, self.every, True)
         every = max(int(longest / self._period), 1)
         if self._joint.motion is None or every == 1:
             return self
         return self._on_grid(self._steps, every)
 
-    def _on_grid(self, steps: int, every: int) -> JointModel:
+    def _on_grid(self, steps: int, every: int, linear: bool | None = None) -> JointModel:
         return JointModel(
-            self._machine, self._replay, self._signals, self._configuration, steps, every
+            self._machine,
+            self._replay,
+            self._signals,
+            self._configuration,
+            steps,
+            every,
+            self._joint.linear if linear is None else linear,
         )
 
     def move(self, plant: Plant, force: Array | None = None, shift: Array | None = None) -> Array:

@@ -57,6 +57,8 @@ class JointSimulation:
         Sensor or actuator that moves the joint.
     control : JointControl
         Source of the command of a pushed joint.
+    linear : bool
+        Whether errors of the initial state are corrected to first order. They are fitted otherwise.
     motion, error : Array or None, float
         Smoothed reading of the sensor that prescribes the motion, shape (ticks,), and its standard
         error. None and 0 for a joint that an actuator moves.
@@ -75,6 +77,7 @@ class JointSimulation:
         configuration: Configuration,
         steps: int,
         every: int = 1,
+        linear: bool = False,
     ) -> None:
         self._machine, self._replay, self._signals = machine, replay, inputs
         self._steps, self.every, self._configuration = steps, every, configuration
@@ -99,6 +102,7 @@ class JointSimulation:
         self._last: Memo[Array] = Memo(KEPT)
         self._starts: Memo[Start] = Memo(KEPT)
         self._start = self._find_start()
+        self.linear = linear
 
     @property
     def pushed(self) -> bool:
@@ -141,11 +145,16 @@ class JointSimulation:
         if start is None:
             return AT_REST
         sensor = sensor_of(plant, start.name)
-        if not start.fitted:
+        if not start.fitted or self.linear:
             return start.find(sensor, None)
         return self._starts.recall(
             self._key(plant), lambda: start.find(sensor, self._prepare_pushed(plant))
         )
+
+    @property
+    def may_be_linear(self) -> bool:
+        """Whether errors of the initial state may be corrected to first order, and have to be."""
+        return self._start is not None and self._start.may_be_linear
 
     # Mechanics
 
@@ -216,7 +225,10 @@ class JointSimulation:
     def _move(self, plant: Plant, force: Array | None, shift: Array | None) -> Array:
         if self.pushed:
             disturbance = np.zeros(len(self._command)) if force is None else force
-            return clip_diverged(self.integrate_pushed(plant, disturbance))
+            moved = clip_diverged(self.integrate_pushed(plant, disturbance))
+            if not self.linear or self._start is None:
+                return moved
+            return self._start.correct(sensor_of(plant, self._start.name), moved)
         if self.mover.component_type is PositionActuator:
             mover = component_of(plant, self.mover.name, PositionActuator)
             position = follow_command(
