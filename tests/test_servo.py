@@ -14,6 +14,10 @@ import rigtwin
 from rigtwin.components import Servo
 from rigtwin.components.servo import push, push_law
 from rigtwin.description.mjcf import Change, write_mjcf
+from rigtwin.diagnosis.evidence import Evidence
+from rigtwin.diagnosis.fitter import Fitter
+from rigtwin.diagnosis.prices import Prices
+from rigtwin.diagnosis.thresholds import STANDARD
 from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Recording
@@ -295,3 +299,16 @@ def test_an_actuator_that_is_no_servo_is_refused(tmp_path: Path) -> None:
     text = model_text(two=False).replace('kp="20.0" kv="1.0"', 'kp="20" gear="2"')
     with pytest.raises(RigtwinError, match="is no servo; expected a position actuator"):
         machine_in(tmp_path, ONE, text)
+
+
+def test_friction_of_a_joint_is_likelier_than_another_damping_of_its_servo(tmp_path: Path) -> None:
+    text = model_text(two=False)
+    machine, recording = machine_in(tmp_path, ONE, text), recorded(text)
+    evidence = Evidence(machine, [recording], [machine.configuration_of(recording)])
+    prices = Prices(Fitter(evidence), STANDARD, 10, 1000.0, 1, 0.0)
+    effects = {str(effect.name): effect for effect in machine.effects()}
+    friction, damping = (
+        prices.price_effect(effects[name]) for name in ("viscous@bearing", "damping_gain@servo")
+    )
+    # A ratio of e to one.
+    assert damping - friction == pytest.approx(1.0)

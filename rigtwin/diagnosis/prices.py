@@ -42,6 +42,8 @@ ELUSIVE = ("payload",)
 the zero or the friction of several joints."""
 CONTAINS_SIMPLER = ("two_lags", "mount", "deadband_asymmetry")
 """Kinds that become a simpler kind at an end of their range."""
+SETTINGS = ("damping_gain",)
+"""Kinds that change a number which somebody set, and resemble friction."""
 WEIGHED = ("mass", "inertia")
 """Kinds that change a mass or a moment of inertia by a factor."""
 SIMPLER_PARAMETERS = 0.5
@@ -120,6 +122,8 @@ class Prices:
         elif count == 1.0 and effect.kind.name in CONTAINS_SIMPLER:
             count += SIMPLER_PARAMETERS
         price = self._effect_price + count * self._parameter_price + (count - 1.0) * t.shape_price
+        if effect.kind.name in SETTINGS:
+            price += t.setting_odds
         if is_rare(effect):
             price += t.rare_odds + self._discrepancy * t.rare_price * self._signal_samples
         return price

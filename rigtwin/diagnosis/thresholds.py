@@ -51,6 +51,9 @@ class Thresholds:
     """Price of each parameter of an effect after the first, nats."""
     rare_odds: float = 5.0
     """Further price of a rare effect, nats."""
+    setting_odds: float = 1.0
+    """Further price of a servo's damping, nats. Somebody set it, while the friction of a joint that
+    it resembles is seldom known."""
     rare_price: float = 0.06
     """Further price of a rare effect where an unexplained residual dominates, nats per independent
     sample of one signal."""

@@ -22,6 +22,7 @@ SCORE = {
     "discrepancy_price": 0.06,
     "shape_price": 4.0,
     "rare_odds": 5.0,
+    "setting_odds": 1.0,
     "rare_price": 0.06,
     "rare_amplitude_share": 0.11,
     "rare_immaterial_price": 0.3,
