@@ -93,7 +93,7 @@ def test_the_authors_controller_reproduces_their_table(case):
 
 
 def test_compiled_code_and_python_give_the_same_command(monkeypatch):
-    ground = ground_motion("kobe")[8 * 4096 : 8 * 4096 + 1536]
+    ground = ground_motion("kobe")[8 * 4096 : 9 * 4096]
     for name in ("kalman-inverse", "adaptive-time-series", "adaptive-model"):
         law = find_compensator(name)
         compiled = run_test(CASES[3], ground, law, noise=BENCHMARK)
