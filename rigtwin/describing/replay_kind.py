@@ -87,15 +87,7 @@ def choose_kind(
     # Every command goes to an actuator that takes a position.
     if commanded and set(commanded) <= set(positions) and placed:
         return _position_test(mechanism, commanded)
-    pushed = [
-        joint
-        for joint in joints
-        if actuator_on(mechanism, joint)
-        and (
-            ((joint in measured or joint in still) and takes_force(mechanism, joint))
-            or any(slots.has(joint, quantity) for quantity in command_quantities(mechanism, joint))
-        )
-    ]
+    pushed = [joint for joint in joints if _is_pushed(mechanism, slots, joint, (*measured, *still))]
     # Joints without an actuator move freely; all others must be pushed by something known.
     if pushed and all(actuator_on(mechanism, j) is None or j in pushed for j in joints):
         if set(pushed) <= set(still):
@@ -137,6 +129,16 @@ def free_swing(
         if meaning.commanded or meaning.quantity in MOVING:
             raise RigtwinError(f"column {column!r}: {why}")
     return ReplayKind(FORCES, "the model has no actuator: the joints swing freely")
+
+
+def _is_pushed(mechanism: Mechanism, slots: Slots, joint: str, measured: Sequence[str]) -> bool:
+    """Return whether the log holds what the actuator of a joint does."""
+    if not actuator_on(mechanism, joint):
+        return False
+    quantities = command_quantities(mechanism, joint)
+    return (joint in measured and takes_force(mechanism, joint)) or any(
+        slots.has(joint, quantity) for quantity in quantities
+    )
 
 
 def command_quantities(mechanism: Mechanism, joint: str) -> tuple[JointQuantity, ...]:

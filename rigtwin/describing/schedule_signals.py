@@ -57,7 +57,7 @@ def schedule_columns(
     used
         Columns that have another meaning.
     """
-    found: list[ScheduleColumn] = []
+    schedules: list[ScheduleColumn] = []
     # Names of joints, actuators, sensors and bodies are those of other components.
     taken = {
         identifier(name)
@@ -76,8 +76,8 @@ def schedule_columns(
             name = identifier(column)
             name = f"{name}_column" if name in taken else name
             unit = log.columns.units.get(column, "")
-            found.append(ScheduleColumn(column, joint, name, unit))
-    return tuple(found)
+            schedules.append(ScheduleColumn(column, joint, name, unit))
+    return tuple(schedules)
 
 
 def _joint_of(words: Collection[str], joints: Sequence[str]) -> str:

@@ -76,29 +76,35 @@ def write_description(
         lines.append(
             f"band = {reading.band!r}            # Hz; above it forces are ripple or noise"
         )
-    believed = [
-        # A command of zero shows nothing of its actuator; a stated factor is not to be estimated
-        # again.
-        f"{actuator_name(mechanism, joint)} = {{ effects = [] }}    # its command is 0 throughout"
-        for joint in reading.idle
-    ]
-    believed += [
-        f"{sensor_name(mechanism, signal.joint, 'force')} = {{ effects = [] }}    "
-        "# its factor was stated"
-        for signal in reading.signals
-        if signal.quantity is JointQuantity.FORCE and signal.formula
-    ]
-    # Only where the motion is given can a force follow a channel.
-    followed = [each for each in reading.schedules if each.joint and kind.test == INVERSE]
-    believed += [_schedule(each) for each in followed]
-    if believed:
-        lines += ["", "[components]", *believed]
+    tables = _tables(mechanism, reading)
+    if tables:
+        lines += ["", "[components]", *tables]
     lines += [
         "",
         "# Components follow from the test. A table of a component states what differs, e.g.:",
     ]
     lines += _examples(mechanism, reading)
     return "\n".join(lines) + "\n"
+
+
+def _tables(mechanism: Mechanism, reading: Reading) -> list[str]:
+    """Tables of the components of which the log says more than the test."""
+    tables = [
+        # A command of zero shows nothing of its actuator; a stated factor is not to be estimated
+        # again.
+        f"{actuator_name(mechanism, joint)} = {{ effects = [] }}    # its command is 0 throughout"
+        for joint in reading.idle
+    ]
+    tables += [
+        f"{sensor_name(mechanism, signal.joint, 'force')} = {{ effects = [] }}    "
+        "# its factor was stated"
+        for signal in reading.signals
+        if signal.quantity is JointQuantity.FORCE and signal.formula
+    ]
+    # Only where the motion is given can a force follow a channel.
+    if reading.kind.test == INVERSE:
+        tables += [_schedule(schedule) for schedule in reading.schedules if schedule.joint]
+    return tables
 
 
 def _schedule(schedule: ScheduleColumn) -> str:
@@ -184,15 +190,14 @@ def write_map(
     if episode:
         lines += ["", "[episodes]", f"column = {_quote(episode)}"]
     channels, named = [], {}
+    for schedule in reading.schedules:
+        text = f'{{ column = {_quote(schedule.column)}, unit = "1" }}'
+        channels.append(f'"/sensor.{schedule.name}" = {text}')
     for signal in reading.signals:
         text, used = _source(signal, columns)
         named |= used
         remarks = "; ".join([signal.why, *signal.assumed])
         channels.append(f"{_quote(channel_of(mechanism, signal))} = {text}    # {remarks}")
-    channels += [
-        f'"/sensor.{each.name}" = {{ column = {_quote(each.column)}, unit = "1" }}'
-        for each in reading.schedules
-    ]
     if named:
         lines += ["", "[columns]", *(f"{plain} = {text}" for plain, text in named.items())]
     lines += ["", "[channels]", *channels]
@@ -241,16 +246,9 @@ def table_rows(mechanism: Mechanism, reading: Reading) -> list[Sequence[str]]:
         unit = "" if signal.formula else signal.unit
         channel = channel_of(mechanism, signal)
         rows.append((signal.key, signal.source, unit, channel, "; ".join(remarks)))
-    rows += [
-        (
-            "may be followed",
-            each.column,
-            "",
-            f"/sensor.{each.name}",
-            f"forces at {each.joint or 'a joint'}",
-        )
-        for each in reading.schedules
-    ]
+    for schedule in reading.schedules:
+        channel, reason = f"/sensor.{schedule.name}", f"forces at {schedule.joint or 'a joint'}"
+        rows.append(("may be followed", schedule.column, "", channel, reason))
     # Unused columns come last: a reader looks for a column that should have been used.
     rows += [("not used", column, "", "", why) for column, why in reading.unused.items()]
     return rows
