@@ -110,3 +110,12 @@ def test_of_two_joints_the_one_that_is_named_follows(tmp_path: Path) -> None:
     ]
     assert '"/sensor.room_temp"' in answer.mapping
     assert "room_temp" not in answer.description
+
+
+def test_columns_of_alike_names_have_names_of_their_own(tmp_path: Path) -> None:
+    columns = moved(0.0)
+    temperature = columns.pop("temperature")
+    columns |= {"temp 1": temperature, "temp-1": temperature[::-1].copy()}
+    answer = rigtwin.describe(write_piston(tmp_path), write_log(tmp_path / "log.csv", columns))
+    names = [schedule.name for schedule in answer.reading.schedules]
+    assert names == ["temp_1", "temp_1_column"]

@@ -137,3 +137,34 @@ def test_velocities_of_no_such_test_or_joint_are_refused(
     )
     with pytest.raises(RigtwinError, match=said):
         rigtwin.machine(path)
+
+
+def test_a_short_log_suffices_for_the_unit_of_a_velocity_command(tmp_path: Path) -> None:
+    time = 1e-3 * np.arange(50)
+    columns = {"t": time, "cmd_vel": np.cos(60.0 * time), "angle": np.sin(60.0 * time) / 60.0}
+    answer = described(tmp_path, write_shaft(tmp_path, VELOCITY), columns)
+    (command,) = (s for s in answer.reading.signals if s.key == "shaft.command")
+    assert (command.unit, command.sign) == ("rad/s", 1.0)
+
+
+def test_a_velocity_without_a_number_is_one_line(tmp_path: Path) -> None:
+    motion = turn(1.0, VISCOUS)
+    columns = {"t": motion["t"], "torque": motion["command"], "omega": np.full(ROWS, np.nan)}
+    with pytest.raises(RigtwinError, match="the velocity of joint shaft, holds no number"):
+        described(tmp_path, write_shaft(tmp_path), columns)
+
+
+def test_a_measured_torque_is_no_command_of_a_voltage(tmp_path: Path) -> None:
+    motion = turn(1.0, VISCOUS)
+    columns = {"t": motion["t"], "torque": motion["command"], "omega": motion["velocity"]}
+    said = "no column is the command of the actuator on shaft, .* say --column shaft.command=COLUMN"
+    with pytest.raises(RigtwinError, match=said):
+        described(tmp_path, write_shaft(tmp_path, DC_MOTOR), columns)
+
+
+def test_a_velocity_that_is_text_is_named_with_its_reason(tmp_path: Path) -> None:
+    rows = "".join(f"{0.004 * row},{np.sin(0.02 * row)},fast\n" for row in range(100))
+    log = tmp_path / "log.csv"
+    log.write_text(f"t,torque,omega\n{rows}")
+    with pytest.raises(RigtwinError, match="column 'omega': "):
+        rigtwin.describe(write_shaft(tmp_path), log)

@@ -46,34 +46,7 @@ def position_command(log: Log, joint: str, position: Array) -> LogSignal | None:
     # The owner has stated all of it: nothing is left to conclude.
     if source is not None and (source.formula or source.unit):
         return log.stated_signal(joint, JointQuantity.COMMAND)
-    try:
-        column, why, sign = _source(log, joint, JointQuantity.COMMAND)
-        general = log.stated.units.get(JointQuantity.COMMAND)
-        si = SI[JointQuantity.POSITION][log.mechanism.turns(joint)]
-        unit = (
-            Unit(general)
-            if general is not None
-            else command_unit(log.columns, column, position, si, key)
-        )
-    except Question as question:
-        log.questions.append(str(question))
-        return None
-    assumed = [unit.assumed] if unit.assumed else []
-    # A position follows its command, late but in the same direction. Stated columns keep the sign
-    # that their owner gave.
-    if source is None and follows(log.columns.values[column], position) < OPPOSED:
-        sign = -1.0
-        assumed.append("sign turned, as the position goes against it")
-    return LogSignal(
-        joint=joint,
-        quantity=JointQuantity.COMMAND,
-        column=column,
-        formula="",
-        unit=unit.name,
-        sign=sign,
-        why=why,
-        assumed=tuple(assumed),
-    )
+    return _following_command(log, joint, JointQuantity.COMMAND, position)
 
 
 def force_command(
@@ -95,7 +68,7 @@ def force_command(
     for quantity in command_quantities(log.mechanism, joint):
         if log.slots.has(joint, quantity):
             if quantity is JointQuantity.VELOCITY_COMMAND:
-                return _velocity_command(log, joint, position)
+                return _following_command(log, joint, quantity, _velocity(position, log.time()))
             return _control(log, joint, quantity)
     # Without any command, the measured force itself is what pushes the model's joint.
     pushes = takes_force(log.mechanism, joint)
@@ -108,29 +81,40 @@ def force_command(
     return None
 
 
-def _velocity_command(log: Log, joint: str, position: Array) -> LogSignal | None:
-    """The command of a velocity servo; None where a question is open."""
-    quantity, key = JointQuantity.VELOCITY_COMMAND, f"{joint}.command"
+def _following_command(
+    log: Log, joint: str, quantity: JointQuantity, motion: Array
+) -> LogSignal | None:
+    """The command that a motion follows; None where a question is open.
+
+    Its unit and its sign are told by the motion: a position in SI, or a velocity.
+    """
+    # A column that its owner assigned keeps the sign that the owner gave.
+    is_stated = log.slots.stated(joint, quantity) is not None
+    measured = JointQuantity.POSITION if quantity is JointQuantity.COMMAND else quantity
+    si = SI[measured][log.mechanism.turns(joint)]
     try:
-        match = log.slots.match(joint, quantity)
-        si = SI[quantity][log.mechanism.turns(joint)]
-        velocity = _velocity(position, log.time())
-        unit = command_unit(log.columns, match.column, velocity, si, key)
+        column, why, sign = _source(log, joint, quantity)
+        general = log.stated.units.get(quantity)
+        unit = (
+            Unit(general)
+            if general is not None
+            else command_unit(log.columns, column, motion, si, f"{joint}.command")
+        )
     except Question as question:
         log.questions.append(str(question))
         return None
     assumed = [unit.assumed] if unit.assumed else []
-    opposed = follows(log.columns.values[match.column], velocity) < OPPOSED
-    if opposed:
-        assumed.append("sign turned, as the velocity goes against it")
+    # A joint follows its command, late but in the same direction.
+    if not is_stated and follows(log.columns.values[column], motion) < OPPOSED:
+        sign = -1.0
+        assumed.append("sign turned, as the joint goes against it")
     return LogSignal(
         joint=joint,
         quantity=quantity,
-        column=match.column,
-        formula="",
+        column=column,
         unit=unit.name,
-        sign=-1.0 if opposed else 1.0,
-        why=match.why,
+        why=why,
+        sign=sign,
         assumed=tuple(assumed),
     )
 
@@ -138,7 +122,8 @@ def _velocity_command(log: Log, joint: str, position: Array) -> LogSignal | None
 def _velocity(position: Array, time: Array) -> Array:
     """Rate of a measured position over `SPAN`, which evens its noise out, shape (rows,)."""
     period = float(time[-1] - time[0]) / max(len(time) - 1, 1)
-    reach = max(round(0.5 * SPAN / max(period, 1e-9)), 1)
+    # A short log keeps most of its rows.
+    reach = min(max(round(0.5 * SPAN / max(period, 1e-9)), 1), len(time) // 8)
     inner = (position[2 * reach :] - position[: -2 * reach]) / (2.0 * reach * period)
     return np.pad(inner, reach, mode="edge")
 
@@ -155,11 +140,9 @@ def no_force(joint: str) -> LogSignal:
         joint=joint,
         quantity=JointQuantity.FORCE_COMMAND,
         column="",
-        formula="0",
         unit="",
-        sign=1.0,
         why="the model has no actuator for it",
-        assumed=(),
+        formula="0",
     )
 
 
@@ -187,10 +170,9 @@ def _control(log: Log, joint: str, quantity: JointQuantity) -> LogSignal | None:
         joint=joint,
         quantity=quantity,
         column=column,
-        formula="",
         unit=unit or "1",
-        sign=sign,
         why=why,
+        sign=sign,
         assumed=() if unit else ("in the unit of the actuator's control",),
     )
     return _as_control(log, signal)

@@ -92,9 +92,7 @@ def force_signal(log: Log, joint: str) -> LogSignal | None:
         joint=joint,
         quantity=JointQuantity.FORCE,
         column=match.column,
-        formula="",
         unit=unit.name,
-        sign=1.0,
         why=match.why,
         assumed=(unit.assumed,) if unit.assumed else (),
     )

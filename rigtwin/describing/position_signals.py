@@ -36,9 +36,10 @@ def ask_positions(log: Log) -> None:
     if not joints:
         raise RigtwinError("the model has no hinge or slide with a name; expected one at least")
     names = [name for name in log.columns.values if name != log.time_column]
+    refused = "".join(f"; column {name!r}: {why}" for name, why in log.columns.refused.items())
     question = ask(
         f"no column is named as the position of {enumerate_names(joints)}; the log has "
-        f"{enumerate_names(names, 30)}",
+        f"{enumerate_names(names, 30)}{refused}",
         option(f"{joints[0]}.position", "COLUMN"),
     )
     log.questions.append(str(question))
@@ -84,7 +85,6 @@ def position_signals(log: Log, joints: Sequence[str]) -> dict[str, LogSignal] | 
             joint=joint,
             quantity=JointQuantity.POSITION,
             column=column,
-            formula="",
             unit=units[joint].name,
             sign=sign,
             why=why,

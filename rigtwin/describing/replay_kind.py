@@ -226,6 +226,15 @@ def _question(
             )
     known = measured or commanded
     lacking = [joint for joint in joints if joint not in known]
+    if not lacking:
+        # Measured forces do not say what such an actuator was told.
+        moved = [joint for joint in joints if not takes_force(mechanism, joint)] or list(joints)
+        return ask(
+            f"no column is the command of the actuator on {enumerate_names(moved)}, and without "
+            "the position the measured force does not suffice",
+            option(f"{moved[0]}.command", "COLUMN"),
+            option(f"{moved[0]}.position", "COLUMN"),
+        )
     return ask(
         f"the log holds forces or commands of {enumerate_names(list(known))} and none of "
         f"{enumerate_names(lacking)}",

@@ -74,7 +74,9 @@ def schedule_columns(
             continue
         if np.ptp(values) > LEAST_VARIATION * np.max(np.abs(values)):
             name = identifier(column)
-            name = f"{name}_column" if name in taken else name
+            while name in taken:
+                name = f"{name}_column"
+            taken.add(name)
             unit = log.columns.units.get(column, "")
             schedules.append(ScheduleColumn(column, joint, name, unit))
     return tuple(schedules)

@@ -22,14 +22,14 @@ class LogSignal:
         Quantity that is read.
     column
         Column of the log; empty where a formula gives the values.
-    formula
-        Formula of columns, in SI; empty where a column gives the values.
     unit
         Unit of the column.
-    sign
-        1 or -1.
     why
         Reason for the column.
+    formula
+        Formula of columns, in SI; empty where a column gives the values.
+    sign
+        1 or -1.
     assumed
         Assumptions about unit, sign and scale, one a sentence; empty where the log or its owner
         states everything.
@@ -44,10 +44,10 @@ class LogSignal:
     joint: str
     quantity: JointQuantity
     column: str
-    formula: str
     unit: str
-    sign: float
     why: str
+    formula: str = ""
+    sign: float = 1.0
     assumed: tuple[str, ...] = ()
     scale: float = 1.0
     checked: str = ""

@@ -13,6 +13,7 @@ from rigtwin.describing.signal import LogSignal
 from rigtwin.describing.units import Unit, known_unit
 from rigtwin.description.coupling import are_coupled
 from rigtwin.description.joint_elements import movable_joints
+from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
 
 SURELY_SI = 100.0
@@ -67,14 +68,17 @@ def _signal(log: Log, joint: str) -> LogSignal:
     if log.slots.stated(joint, JointQuantity.VELOCITY) is not None:
         return log.stated_signal(joint, JointQuantity.VELOCITY)
     match = log.slots.match(joint, JointQuantity.VELOCITY)
+    if not np.isfinite(log.columns.values[match.column]).any():
+        raise RigtwinError(
+            f"column {match.column!r}, the velocity of joint {joint}, holds no number; expected "
+            "one in most rows"
+        )
     unit = _unit(log, joint, match.column)
     return LogSignal(
         joint=joint,
         quantity=JointQuantity.VELOCITY,
         column=match.column,
-        formula="",
         unit=unit.name,
-        sign=1.0,
         why=match.why,
         assumed=(unit.assumed,) if unit.assumed else (),
     )
