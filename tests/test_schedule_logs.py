@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import rigtwin
+from rigtwin.diagnosis.report import meaning_of
 from rigtwin.numerics.arrays import Array
 from tests.helpers.logs import write_log
 
@@ -53,6 +54,11 @@ def test_friction_that_follows_a_temperature_is_named_with_its_slope(tmp_path: P
     assert set(effects) == {"viscous@piston", "viscous@temperature"}
     slope = effects["viscous@temperature"].parameters["viscous"]
     assert slope.value == pytest.approx(-1.5, rel=0.03)
+    # No column says the unit of the temperature.
+    assert slope.unit == "Ns/m/unit"
+    meaning = meaning_of(effects["viscous@temperature"])
+    assert meaning == "viscous friction that falls as the recorded channel grows"
+    assert meaning_of(effects["viscous@piston"]) == "friction in proportion to the speed"
     # Per degree from zero degrees on.
     at_zero = effects["viscous@piston"].parameters["viscous"]
     assert at_zero.value == pytest.approx(60.0 + 1.5 * 20.0, rel=0.03)

@@ -129,6 +129,7 @@ KINDS = (
         ("coulomb",),
         "dry friction that grows with the recorded channel",
         {Schedule: _per_channel("force")},
+        "dry friction that falls as the recorded channel grows",
     ),
     Kind(
         "viscous",
@@ -136,6 +137,7 @@ KINDS = (
         ("viscous",),
         "viscous friction that grows with the recorded channel",
         {Schedule: _per_channel("damping")},
+        "viscous friction that falls as the recorded channel grows",
     ),
     Kind(
         "offset",

@@ -411,7 +411,7 @@ class Machine:
         unit, per, _ = unit.partition(PER_CHANNEL)
         # Parameters are declared for slides; at a hinge the same number is in angular units.
         turned = TURNING.get(unit, unit) if component.turns else unit
-        return f"{turned}/{component.unit}" if per and component.unit else turned
+        return f"{turned}/{component.unit or 'unit'}" if per else turned
 
 
 SYNONYMS = {"gain": "constant", "lag": "delay"}

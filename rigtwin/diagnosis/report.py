@@ -265,9 +265,11 @@ def meaning_of(effect: Finding) -> str:
 
     Some kinds have a different meaning for a negative value: a negative lag is a lead.
     """
-    kind = next((each for each in KINDS if each.name == effect.name.kind), None)
-    if kind is None:
+    kinds = [kind for kind in KINDS if kind.name == effect.name.kind]
+    if not kinds:
         return ""
+    # Some names are shared: the viscous friction of a guide, and one that follows a channel.
+    kind = next((kind for kind in kinds if kind.title == effect.title), kinds[0])
     estimate = effect.parameters.get(kind.parameters[0])
     below = estimate is not None and estimate.value < 0.0
     return kind.negative if below and kind.negative else kind.meaning
