@@ -18,7 +18,6 @@ import math
 import numpy as np
 
 from controllers.compiled import inlined
-from rigtwin.components import Guide
 from rigtwin.models.forward_arrays import GuideContacts, State, WorkSpace
 from rigtwin.numerics.cholesky import solve
 from rigtwin.numerics.compiling import kernel
@@ -28,7 +27,6 @@ SWEEPS = 200
 CONVERGED = 1e-10
 """Largest change of a friction force at which the sweeps end, as a share of the largest friction
 limit."""
-BACKLASH = Guide._fields.index("backlash")
 
 
 @kernel
@@ -124,7 +122,7 @@ def rub(contacts: GuideContacts, free: np.ndarray, state: State, h: float, work:
                 free=speed,
                 compliance=work.coupling[g, g],
                 h=h,
-                half=0.5 * contacts.guides[g, BACKLASH],
+                half=0.5 * contacts.guides[g].backlash,
                 spring=contacts.springs[g],
                 forward=work.forward[g],
                 backward=work.backward[g],

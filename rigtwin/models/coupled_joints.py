@@ -15,7 +15,6 @@ from itertools import pairwise
 import mujoco
 import numpy as np
 
-from rigtwin.components import Guide
 from rigtwin.components.plant import Plant, select
 from rigtwin.components.sensors import apply_sensor, sensor_of
 from rigtwin.description.configuration import Configuration
@@ -344,8 +343,8 @@ def begin(
     along, guides = contacts.along, contacts.guides
     rate = along @ speed
     position = along @ place + contacts.zero
-    viscous, more = (Guide._fields.index(name) for name in ("viscous", "viscous_asymmetry"))
-    damping = guides[:, viscous] + 0.5 * guides[:, more] * np.where(rate > 0.0, 1.0, -1.0)
+    more = 0.5 * guides["viscous_asymmetry"]
+    damping = guides["viscous"] + np.where(rate > 0.0, more, -more)
     return State(
         place=place,
         speed=speed,

@@ -15,8 +15,8 @@ class GuideContacts(NamedTuple):
     A guide's position is `zero + along · q`, with the machine's coordinates q.
     """
 
-    guides: Array  # Parameters of each `Guide`, shape (guides, parameters).
-    dry: Array  # Parameters of each `Friction`, shape (guides, parameters).
+    guides: np.ndarray  # Each `Guide`, as records, shape (guides,).
+    dry: np.ndarray  # Each `Friction`, as records, shape (guides,).
     along: Array  # Direction of each guide in the coordinates, shape (guides, coordinates).
     zero: Array  # Position of each guide at zero coordinates, m, shape (guides,).
     springs: Array  # Stiffness in series with the dry friction, N/m, shape (guides,).
@@ -41,7 +41,7 @@ class State(NamedTuple):
 class Servos(NamedTuple):
     """Servos of the machine as compiled code takes them, one row for each servo."""
 
-    laws: Array  # Fields of each `Push`, shape (servos, 5).
+    laws: np.ndarray  # Each `Push`, as records, shape (servos,).
     levers: Array  # Direction of each servo in the coordinates, shape (servos, coordinates).
     zero: Array  # Position of each servo at zero coordinates, m, shape (servos,).
     inertia: Array  # Inertia that each servo moves, kg, shape (servos,).

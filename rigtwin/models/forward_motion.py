@@ -20,43 +20,20 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba.np.unsafe.ndarray import to_fixed_tuple
 
 from controllers.compiled import inlined
 from rigtwin.components import Guide
-from rigtwin.components.guide import Friction, damping, dry_limits, position_force, slide
+from rigtwin.components.guide import damping, dry_limits, position_force, slide
 from rigtwin.components.guide_step import GuideStep
 from rigtwin.components.mount import MountState, give_way
-from rigtwin.components.servo import Push, pull, push
+from rigtwin.components.servo import pull, push
 from rigtwin.models.coupled_friction import rub
 from rigtwin.models.forward_arrays import GuideContacts, Servos, State, StepInputs, WorkSpace
 from rigtwin.models.joint_motion import SHORTEST
 from rigtwin.models.multibody import Bodies, find_terms
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.cholesky import factor, solve
-from rigtwin.numerics.compiling import kernel, loop_kernel
-
-# Numba needs the lengths of tuples at compile time. `Friction.changing` is a flag, not a number.
-GUIDE, NUMBERS = len(Guide._fields), len(Friction._fields) - 1
-LAW = len(Push._fields)
-
-
-@kernel
-def guide_of(values: Array) -> Guide:
-    """Return a guide from its parameters, shape (parameters,)."""
-    return Guide(*to_fixed_tuple(values, GUIDE))  # type: ignore[call-arg]
-
-
-@kernel
-def friction_of(values: Array) -> Friction:
-    """Return dry friction from its parameters, shape (parameters,)."""
-    return Friction(values[0] > 0.0, *to_fixed_tuple(values[1:], NUMBERS))  # type: ignore[call-arg]
-
-
-@kernel
-def law_of(values: Array) -> Push:
-    """Return a servo's law from its parameters, shape (5,)."""
-    return Push(*to_fixed_tuple(values, LAW))  # type: ignore[call-arg]
+from rigtwin.numerics.compiling import loop_kernel
 
 
 @inlined
@@ -78,7 +55,7 @@ def serve(servos: Servos, state: State, number: int, h: float, work: WorkSpace) 
     """Add the servos' forces over step `number`, but for the implicit share of their damping."""
     size = len(work.pushed)
     for a in range(len(servos.laws)):
-        law = law_of(servos.laws[a])
+        law = servos.laws[a]
         position_at, rate_mid, rate_now = servos.zero[a], 0.0, 0.0
         for i in range(size):
             position_at += servos.levers[a, i] * state.place[i]
@@ -114,7 +91,7 @@ def hold_back(
 
     The mount decouples the guide: its force follows from the position alone, and is explicit.
     """
-    share, dry = h / (guide.relaxation + h), friction_of(contacts.dry[g])
+    share, dry = h / (guide.relaxation + h), contacts.dry[g]
     guide_step = GuideStep(guide, dry, contacts.springs[g], contacts.rests[g], h, share)
     before = MountState(state.inner[g], state.within[g], state.slider[g], state.viscous[g])
     after, force = give_way(guide_step, before, load, place)
@@ -133,7 +110,7 @@ def resist_explicitly(
         work.damped[g] = work.implicit[g] = 0.0
         if not contacts.acts[g]:
             continue
-        guide = guide_of(contacts.guides[g])
+        guide = contacts.guides[g]
         place, rate, load, along_squared = contacts.zero[g], 0.0, 0.0, 0.0
         for i in range(len(work.pushed)):
             along = contacts.along[g, i]
@@ -156,7 +133,7 @@ def resist_explicitly(
         work.guide_force[g] -= position_force(guide, place, contacts.rests[g])
         work.guide_force[g] -= (1.0 - share) * state.viscous[g]
         work.guide_force[g] -= (1.0 - implicit) * damped * rate
-        friction = friction_of(contacts.dry[g])
+        friction = contacts.dry[g]
         work.forward[g], work.backward[g] = dry_limits(friction, rate, load)
 
 
@@ -232,7 +209,7 @@ def update_guides(contacts: GuideContacts, state: State, h: float, work: WorkSpa
     for g in range(len(contacts.springs)):
         if work.mounted[g] or not contacts.acts[g]:
             continue
-        guide = guide_of(contacts.guides[g])
+        guide = contacts.guides[g]
         ahead, rate, implicit = 0.0, work.rate[g], work.implicit[g]
         for i in range(len(work.ahead_speed)):
             ahead += contacts.along[g, i] * work.ahead_speed[i]

@@ -24,7 +24,7 @@ from rigtwin.models.forward_arrays import GuideContacts, Servos, StepInputs
 from rigtwin.models.joint_layout import JointLayout
 from rigtwin.models.joint_motion import RIGID
 from rigtwin.models.measured_motion import ELASTIC, recover_motion
-from rigtwin.numerics.arrays import Array, interpolate
+from rigtwin.numerics.arrays import Array, interpolate, to_records
 from rigtwin.recording import Inputs
 
 
@@ -122,7 +122,7 @@ class JointDrives:
         names = self._layout.servos
         laws = [push_law(pusher_of(plant, name)) for name in names]
         return Servos(
-            laws=np.array(laws, float).reshape(len(names), len(Push._fields)),
+            laws=to_records(Push, laws),
             levers=self._layout.directions(names),
             zero=np.array([self._layout.zero[name] for name in names]),
             inertia=np.array([self.inertia_along(self._layout.along[name]) for name in names]),
@@ -173,8 +173,8 @@ class JointDrives:
                 rigid if guide.compliance <= 0.0 else min(1.0 / guide.compliance, rigid)
             )
         return GuideContacts(
-            guides=np.array(guides, float).reshape(len(guides), len(Guide._fields)),
-            dry=np.array(dry, float).reshape(len(guides), len(Friction._fields)),
+            guides=to_records(Guide, guides),
+            dry=to_records(Friction, dry),
             along=layout.directions(layout.guides),
             zero=np.array([layout.zero[name] for name in layout.guides]),
             springs=springs,

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
+from functools import cache
+from typing import Any, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,3 +36,25 @@ def interpolate(time: Array, values: Array, at: Array) -> Array:
     from scipy.interpolate import CubicSpline
 
     return CubicSpline(time, values)(at)
+
+
+def to_records(kind: type[Any], rows: Sequence[Any]) -> np.ndarray:
+    """Return named tuples of numbers as an array of records, shape (rows,).
+
+    Compiled code reads a record's field from memory. A named tuple would be copied as a whole, many
+    times in every step, wherever its index is known at run time only.
+
+    Parameters
+    ----------
+    kind
+        Named tuple whose fields are all `float` or `bool`.
+    rows
+        Instances of it.
+    """
+    return np.array([tuple(row) for row in rows], _record_type(kind))
+
+
+@cache
+def _record_type(kind: type[Any]) -> np.dtype[Any]:
+    hints = get_type_hints(kind)
+    return np.dtype([(name, hints[name]) for name in hints], align=True)

@@ -71,6 +71,18 @@ fwd_position = types.ExternalFunction("mj_fwdPosition", types.void(*_STRUCTURES)
 """mj_fwdPosition(model, data): everything that depends on positions."""
 fwd_velocity = types.ExternalFunction("mj_fwdVelocity", types.void(*_STRUCTURES))
 """mj_fwdVelocity(model, data): everything that depends on velocities, after mj_fwdPosition."""
+kinematics = types.ExternalFunction("mj_kinematics", types.void(*_STRUCTURES))
+"""mj_kinematics(model, data): poses of the bodies."""
+com_position = types.ExternalFunction("mj_comPos", types.void(*_STRUCTURES))
+"""mj_comPos(model, data): inertias and joint axes about the centres of mass."""
+make_inertia = types.ExternalFunction("mj_makeM", types.void(*_STRUCTURES))
+"""mj_makeM(model, data): inertia matrix."""
+com_velocity = types.ExternalFunction("mj_comVel", types.void(*_STRUCTURES))
+"""mj_comVel(model, data): velocities of the bodies."""
+passive = types.ExternalFunction("mj_passive", types.void(*_STRUCTURES))
+"""mj_passive(model, data): forces of springs, dampers, gravity compensation and fluid."""
+newton_euler = types.ExternalFunction("mj_rne", types.void(*_STRUCTURES, types.int32, types.intp))
+"""mj_rne(model, data, whether accelerations count, address of the forces): bias forces."""
 step = types.ExternalFunction("mj_step", types.void(*_STRUCTURES))
 """mj_step(model, data): a complete step."""
 integrate = types.ExternalFunction("mj_implicit", types.void(*_STRUCTURES))
