@@ -14,6 +14,7 @@ from rigtwin.diagnosis.finding import (
     Name,
     NextTest,
     Place,
+    Tolerated,
     Unobservable,
 )
 from rigtwin.diagnosis.text import describe, sentence
@@ -113,3 +114,11 @@ def test_a_sentence_tells_the_greatest_of_many_effects():
     assert said.startswith("Joint 9 has")
     assert "and 4 more effects that are smaller" in said
     assert "joint 4" not in said
+
+
+def test_a_tolerance_that_is_used_up_is_measured_instead_of_looking_for_an_effect():
+    tolerated = Tolerated("elbow", "coulomb", Estimate(0.95, 0.85, 0.94, 0.9, "Nm"))
+    effects = (finding("rail", "coulomb", 0.97),)
+    advice = advise(answer("partly explained", effects=effects, tolerated=(tolerated,)))
+    assert any("Measure coulomb@elbow" in step for step in advice)
+    assert not any("residual" in step for step in advice)

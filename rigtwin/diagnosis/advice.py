@@ -52,7 +52,13 @@ def advise(answer: Answer) -> tuple[str, ...]:
             "values correct the twin even if another effect is the cause, so inspect the part "
             "before repairing it."
         )
-    if answer.verdict != "explained":
+    if answer.tolerated:
+        parts = ", ".join(f"{part.parameter}@{part.component}" for part in answer.tolerated)
+        steps.append(
+            f"Measure {parts}: a declared tolerance is used up there, and a better nominal value "
+            "would close more of the gap."
+        )
+    if answer.verdict == "unknown" or (answer.verdict != "explained" and not answer.tolerated):
         steps += _locate_residual(answer)
     # `Gap.held_out` is a description from `cross_validation`: "blocks left out of the fit in turn",
     # or "2 held-out recordings".
@@ -62,7 +68,8 @@ def advise(answer: Answer) -> tuple[str, ...]:
             "correction holds there."
         )
     if answer.verdict == "partly explained":
-        steps.append(f"{SAVE_TWIN} The corrected twin does not model the remaining residual.")
+        omitted = "tolerances" if answer.tolerated else "remaining residual"
+        steps.append(f"{SAVE_TWIN} The corrected twin does not model the {omitted}.")
     return tuple(steps)
 
 

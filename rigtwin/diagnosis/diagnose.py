@@ -60,6 +60,7 @@ from rigtwin.diagnosis.stops import find_cut_commands, find_stops
 from rigtwin.diagnosis.support import Support
 from rigtwin.diagnosis.text import sentence
 from rigtwin.diagnosis.thresholds import STANDARD, Thresholds
+from rigtwin.diagnosis.tolerated import describe_used_up, find_used_up
 from rigtwin.diagnosis.unknown_input import DisturbanceFit, locate_disturbance
 from rigtwin.diagnosis.unused_channels import describe_unused
 from rigtwin.diagnosis.usable_data import (
@@ -255,9 +256,10 @@ def _diagnose_part(
     progress("choosing the next test", 1)
     next_test = _next_test(evidence.machine, explanation, effects, named, tests, thresholds)
     has_gap = verdict != "no gap"
+    tolerated = () if judged.has_residual else find_used_up(evidence, explanation.fit, judged.named)
     answer = Answer(
         verdict=verdict,
-        sentence=sentence(verdict, effects, where, gap),
+        sentence=sentence(verdict, effects, where, gap, bool(tolerated)),
         effects=tuple(effects),
         where=tuple(where),
         gap=gap,
@@ -267,7 +269,10 @@ def _diagnose_part(
         ),
         next_test=next_test,
         not_observable=list_unobservable(explanation, attributed),
-        notes=tuple(_collect_notes(evidence, judged, readings, thresholds)),
+        notes=(
+            *_collect_notes(evidence, judged, readings, thresholds),
+            *describe_used_up(tolerated),
+        ),
         recordings=tuple(str(recording.path) for recording in evidence.recordings),
         seconds=time.perf_counter() - started,
         machine=evidence.machine.name,
@@ -280,6 +285,7 @@ def _diagnose_part(
         confounded=find_confounded(evidence, explanation.fit, named, candidates(evidence)),
         nearest=find_nearest(explanation, evidence) if verdict == "unknown" else None,
         energy=_energy(evidence),
+        tolerated=tolerated,
     )
     corrected = _correct(evidence.configurations[0], plant, readings.sampled)
     otherwise = _other_explanations(explanation, named, thresholds.alternative_weight)

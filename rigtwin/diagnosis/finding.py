@@ -270,6 +270,23 @@ class Nearest:
 
 
 @dataclass(frozen=True)
+class Tolerated:
+    """Parameter whose declared tolerance the correction uses up.
+
+    Attributes
+    ----------
+    component, parameter
+        Parameter and its component.
+    estimate
+        Value that fits best. Its interval is the declared tolerance.
+    """
+
+    component: str
+    parameter: str
+    estimate: Estimate
+
+
+@dataclass(frozen=True)
 class Step:
     """One stage of the search: the model with one more effect, and its residual.
 
@@ -341,6 +358,8 @@ class Answer:
         Best explanation of an unknown gap. None for every other verdict.
     energy
         Recording of a hybrid test → energy that its loop added.
+    tolerated
+        Tolerances that the correction uses up, where it leaves nothing but noise beside them.
     """
 
     verdict: Verdict
@@ -363,6 +382,7 @@ class Answer:
     confounded: tuple[Confounded, ...] = ()
     nearest: Nearest | None = None
     energy: dict[str, EnergyError] = field(default_factory=dict)
+    tolerated: tuple[Tolerated, ...] = ()
 
     def document(self) -> dict[str, Any]:
         """Return the JSON document, which keeps to `answer.schema.json`."""
@@ -395,6 +415,7 @@ class Answer:
                 }
                 for name, error in self.energy.items()
             },
+            "tolerated": [asdict(part) for part in self.tolerated],
             "recordings": list(self.recordings),
             "seconds": self.seconds,
         }

@@ -57,7 +57,7 @@ def join(
     verdict = _join_verdicts([answer.verdict for answer in answers], bool(effects))
     answer = Answer(
         verdict=verdict,
-        sentence=sentence(verdict, effects, where, gap),
+        sentence=sentence(verdict, effects, where, gap, _is_tolerated(answers)),
         effects=effects,
         where=where,
         gap=gap,
@@ -72,12 +72,20 @@ def join(
         leftovers=tuple(place for answer in answers for place in answer.leftovers),
         traces=tuple(trace for answer in answers for trace in answer.traces),
         confounded=tuple(entry for answer in answers for entry in answer.confounded),
+        tolerated=tuple(part for answer in answers for part in answer.tolerated),
         nearest=next((answer.nearest for answer in answers if answer.nearest), None)
         if verdict == "unknown"
         else None,
     )
     otherwise = tuple(pair for part in parts for pair in part.otherwise)
     return Diagnosis(answer, evidence.machine, evidence, corrected, otherwise, held_out)
+
+
+def _is_tolerated(answers: Sequence[Answer]) -> bool:
+    """Return whether what every part leaves lies within declared tolerances."""
+    return all(
+        answer.tolerated or answer.verdict in ("no gap", "explained") for answer in answers
+    ) and any(answer.tolerated for answer in answers)
 
 
 def _join_effects(answers: Sequence[Answer], weights: Sequence[float]) -> tuple[Finding, ...]:

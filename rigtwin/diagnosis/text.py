@@ -204,7 +204,13 @@ def _describe_rival(rival: Rival) -> str:
     return f"{rival.name} ({_list_values(rival.parameters)}{beside})"
 
 
-def sentence(verdict: Verdict, effects: Sequence[Finding], where: Sequence[Place], gap: Gap) -> str:
+def sentence(
+    verdict: Verdict,
+    effects: Sequence[Finding],
+    where: Sequence[Place],
+    gap: Gap,
+    is_tolerated: bool = False,
+) -> str:
     """Write the answer in one sentence.
 
     Parameters
@@ -217,6 +223,8 @@ def sentence(verdict: Verdict, effects: Sequence[Finding], where: Sequence[Place
         Locations of the gap, the largest first.
     gap
         Gap before and after the correction.
+    is_tolerated
+        Whether what the correction leaves lies within declared tolerances.
 
     Returns
     -------
@@ -251,7 +259,11 @@ def sentence(verdict: Verdict, effects: Sequence[Finding], where: Sequence[Place
             f"; the correction closes {100 * gap.shrinkage_held_out.value:.0f} "
             "% of the gap on data held out of the fit"
         )
-    residual = "; an unmodelled residual remains" if verdict == "partly explained" else ""
+    residual = ""
+    if verdict == "partly explained":
+        residual = "; an unmodelled residual remains"
+        if is_tolerated:
+            residual = "; the remaining gap lies within the declared tolerances"
     text = listed + more + closed + residual + "."
     return text[0].upper() + text[1:]
 
