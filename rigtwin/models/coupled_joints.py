@@ -170,9 +170,8 @@ class CoupledJoints:
         """Return a function that predicts the rows from an initial state, between two ticks."""
         # Inputs are prepared by the first call: states that are known already need none.
         prepare = cache(lambda: self._prepare(plant, {}))
-        undisturbed = self._no_force()
         return lambda start, first, last: self._sense(
-            plant, clip_diverged(prepare()(start, *undisturbed, first, last))
+            plant, clip_diverged(prepare()(start, first, last))
         )
 
     def _seen_by(self, name: str, kind: str) -> Seen:
@@ -194,27 +193,27 @@ class CoupledJoints:
         }
         return select(plant, sorted(names))
 
-    def _no_force(self) -> tuple[Array, Array]:
-        return (
-            np.zeros((self._layout.bodies.coordinates, self._ticks)),
-            np.zeros((len(self._layout.guides), self._ticks)),
-        )
-
     def _prepare(
-        self, plant: Plant, shifts: Mapping[str, Array]
-    ) -> Callable[[Array, Array, Array, int, int], Array]:
+        self,
+        plant: Plant,
+        shifts: Mapping[str, Array],
+        disturbance: Array | None = None,
+        guide_disturbance: Array | None = None,
+    ) -> Callable[[Array, int, int], Array]:
         """Return a function that integrates the machine.
 
-        Its arguments are the initial state, shape (2, coordinates), the disturbances of coordinates
-        and guides, N, the first tick, and the tick after the last.
+        Its arguments are the initial state, shape (2, coordinates), the first tick, and the tick
+        after the last. Shifts and disturbances are those of `move`.
         """
         multibody, turning = self._bodies_of(plant), self._layout.turning(plant)
         inputs = self._drives.collect(plant, shifts)
+        if disturbance is not None:
+            inputs = inputs._replace(disturbance=disturbance)
+        if guide_disturbance is not None:
+            inputs = inputs._replace(guide_disturbance=guide_disturbance)
         contacts, size = self._drives.contacts(plant, inputs.pushes), multibody.coordinates
 
-        def move(
-            start: Array, disturbance: Array, guide_disturbance: Array, first: int, last: int
-        ) -> Array:
+        def move(start: Array, first: int, last: int) -> Array:
             # Compiled code knows MuJoCo's data by its address only: this name keeps it alive.
             data: mujoco.MjData = multibody.data()
             bodies = multibody.bodies(data, turning)
@@ -229,9 +228,7 @@ class CoupledJoints:
                 free=self._layout.free,
                 held=self._layout.held,
                 state=state,
-                inputs=inputs._replace(
-                    disturbance=disturbance, guide_disturbance=guide_disturbance
-                ),
+                inputs=inputs,
                 work=work,
                 h=h,
                 steps=self._steps,
@@ -272,14 +269,9 @@ class CoupledJoints:
         """
 
         def compute() -> Array:
-            undisturbed = self._no_force()
-            forces = (
-                undisturbed[0] if disturbance is None else disturbance,
-                undisturbed[1] if guide_disturbance is None else guide_disturbance,
-            )
-            integrate = self._prepare(plant, shifts or {})
+            integrate = self._prepare(plant, shifts or {}, disturbance, guide_disturbance)
             parts = [
-                integrate(start, *forces, window.first, window.last)
+                integrate(start, window.first, window.last)
                 for window, start in zip(self._starts.windows, self._starts_of(plant), strict=True)
             ]
             return clip_diverged(parts[0] if len(parts) == 1 else np.concatenate(parts, axis=2))

@@ -126,14 +126,14 @@ class ForwardDynamicsModel(CoupledJoints, Model[Plant]):
         return self._starts.correct(plant, self._key(plant), self._sense_from(plant), predicted)
 
     def predict_disturbed(self, plant: Plant, entry: str, amount: Array) -> Array:
-        disturbance, guide_disturbance = self._no_force()
         if entry in self._layout.guides:
+            guide_disturbance = np.zeros((len(self._layout.guides), self._ticks))
             guide_disturbance[self._layout.guides.index(entry)] = amount
             return self._sense(plant, self.move(plant, guide_disturbance=guide_disturbance))
         if entry in self._layout.leaders:
             return self._sense(plant, self.move(plant, shifts={entry: amount}))
         if entry in self._layout.along and entry not in {row.name for row in self.rows}:
-            disturbance += self._layout.along[entry][:, None] * amount
+            disturbance = self._layout.along[entry][:, None] * amount
             return self._sense(plant, self.move(plant, disturbance=disturbance))
         predicted = self.predict(plant)
         predicted[[row.name for row in self.rows].index(entry)] += amount

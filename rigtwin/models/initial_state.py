@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -95,6 +96,12 @@ class Judged:
     slopes: Array
     ticks: int
     responses: Array
+
+    @cached_property
+    def squares(self) -> Array:
+        """Sᵀ S of each row's slopes S, shape (rows, unknowns, unknowns)."""
+        by_row = self.slopes.reshape(len(self.rows), self.ticks, -1)
+        return np.matmul(by_row.transpose(0, 2, 1), by_row)
 
 
 class InitialState:
@@ -295,10 +302,9 @@ class InitialState:
         assert judged is not None
         residual = judged.measured - predicted[list(judged.rows), : judged.ticks]
         # A wrong model must not be blamed on the initial state: its residual widens the tolerance.
-        held = np.maximum(judged.held, np.sqrt(np.mean(residual**2, axis=1)))
-        columns = judged.slopes / np.repeat(held, judged.ticks)[:, None]
-        normal = columns.T @ columns + np.eye(columns.shape[1]) / LIKELY**2
-        pull = columns.T @ (residual / held[:, None]).ravel() - moved / LIKELY**2
+        weights = 1.0 / np.maximum(judged.held**2, np.mean(residual**2, axis=1))
+        normal = np.tensordot(weights, judged.squares, axes=1) + np.eye(len(moved)) / LIKELY**2
+        pull = (weights[:, None] * residual).ravel() @ judged.slopes - moved / LIKELY**2
         return np.linalg.solve(normal, pull)
 
     def find(self, plant: Plant, sense: Sense) -> Array:

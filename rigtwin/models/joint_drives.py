@@ -64,6 +64,11 @@ class JointDrives:
         self._machine, self._layout, self._signals = machine, layout, signals
         self._read, self._loosest, self._steps = motions, loosest, steps
         self._period, self._ticks = signals.period, signals.ticks
+        # Zeros that nobody writes to serve all predictions.
+        self._undisturbed = (
+            np.zeros((layout.bodies.coordinates, self._ticks)),
+            np.zeros((len(layout.guides), self._ticks)),
+        )
 
     def prescribe(self, plant: Plant, shifts: Mapping[str, Array]) -> Array:
         """Return the prescribed positions at the steps, m, shape (coordinates, steps + 1).
@@ -139,8 +144,8 @@ class JointDrives:
             prescribed=self.prescribe(plant, shifts),
             pushes=self.push_forces(plant),
             levers=layout.directions(layout.pushers),
-            disturbance=np.zeros((layout.bodies.coordinates, self._ticks)),
-            guide_disturbance=np.zeros((len(layout.guides), self._ticks)),
+            disturbance=self._undisturbed[0],
+            guide_disturbance=self._undisturbed[1],
             servos=self.serve(plant),
         )
 
