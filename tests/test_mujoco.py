@@ -41,6 +41,7 @@ SIZES = {
     "relaxation": 0.03,
     "cogging": 3.0,
     "position_force": 3.0,
+    "end_stops": 300.0,
     "load_friction": 0.3,
     "mass": 3.0,
     "armature": 0.8,
@@ -54,6 +55,8 @@ SIZES = {
     "rate_limit": 120.0,
 }
 """Each effect's magnitude; large, so that a law that is not there is seen."""
+SHAPES = {"end_stops": {"stop_damping": 5.0, "stop_low": -0.03, "stop_high": 0.06}}
+"""Other parameters of an effect that has none at their nominal values."""
 
 
 def models(machine: Machine, column: dict[str, dict[str, Array]]) -> tuple[JointModel, MujocoModel]:
@@ -70,9 +73,9 @@ def rubbed(machine: Machine):
     return with_parameters(machine.plant, "guide", FRICTION)
 
 
-def with_effect(plant, effect: Effect):
-    magnitude = effect.kind.parameters[0]
-    return with_parameters(plant, effect.group, {magnitude: SIZES[effect.kind.name]})
+def with_effect(plant, effect: Effect, size: float):
+    changes = {effect.kind.parameters[0]: size, **SHAPES.get(effect.kind.name, {})}
+    return with_parameters(plant, effect.group, changes)
 
 
 def mechanical(machine: Machine) -> list[Effect]:
@@ -113,7 +116,7 @@ def test_every_effect_of_a_pushed_joint_moves_it_as_in_mujoco(tmp_path, sort):
             size *= scale
         if sort == "pendulum" and effect.kind.name in ("mass", "armature"):
             size = 1.5 * machine.plant.mass.mass
-        plant = with_parameters(plain, effect.group, {effect.kind.parameters[0]: size})
+        plant = with_effect(plain, effect, size)
         ours, theirs = fast.move(plant)[0], reference.move(plant)[0]
         felt = rms(theirs - unmoved)
         assert felt > 1e-3 * rms(unmoved), f"{effect.name} is not felt"
@@ -133,7 +136,7 @@ def test_every_effect_of_a_carried_joint_takes_the_force_that_mujoco_says(tmp_pa
     for effect in mechanical(machine):
         if effect.group == "drive":
             continue
-        plant = with_effect(plain, effect)
+        plant = with_effect(plain, effect, SIZES[effect.kind.name])
         ours, theirs = fast.move(plant)[2], reference.move(plant)[2]
         felt = rms(theirs - unmoved)
         assert felt > 1e-3 * rms(unmoved), f"{effect.name} is not felt"

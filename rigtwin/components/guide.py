@@ -79,11 +79,13 @@ class Guide(NamedTuple):
 
     With position x, velocity v and transmitted force F_t:
 
-        force        = F_viscous + drag·v·|v| + F_position + F_dry
+        force        = F_viscous + drag·v·|v| + F_position + F_stop + F_dry
         F_viscous    = (viscous ± ½·viscous_asymmetry)·v, through a first-order lag `relaxation`
         F_position   = stiffness·(x − x_rest) + offset
                        + cogging·sin(2π·x/cogging_pitch + cogging_phase)
                        + Σ_n curve_n·T_n(ξ),  n = 2 … 5
+                       + stop_stiffness·s(x)
+        F_stop       = stop_damping·v  where s(x) ≠ 0
         |F_dry|      ≤ coulomb + load_coefficient·|F_t|
                        + stribeck·exp(−|v/stribeck_velocity|^stribeck_exponent) ± ½·asymmetry
 
@@ -93,6 +95,8 @@ class Guide(NamedTuple):
 
     T_n is the Chebyshev polynomial of degree n, and ξ = (x − curve_middle)/curve_half_range, held
     within ±1: beyond the range in which a curve was identified, its force stays as at the end.
+
+    s(x) is how far x lies beyond `stop_high`, or below `stop_low` (negative), and 0 between them.
 
     The transmitted force is what reaches the guide from the body and the guide's own spring where
     the motion is given, and the actuator's force where the motion follows from a force
@@ -126,9 +130,22 @@ class Guide(NamedTuple):
     curve_5: Annotated[float, Quantity("N", -1e7, 1e7, NONE)] = 0.0
     curve_middle: Annotated[float, Quantity("m", -1e3, 1e3, NONE)] = 0.0
     curve_half_range: Annotated[float, Quantity("m", 1e-9, 1e3, NONE)] = 1.0
+    stop_stiffness: Annotated[float, Quantity("N/m", 0.0, 1e12, NONE)] = 0.0
+    stop_damping: Annotated[float, Quantity("Ns/m", 0.0, 1e9, NONE)] = 0.0
+    stop_low: Annotated[float, Quantity("m", -1e3, 1e3, NONE)] = -1.0
+    stop_high: Annotated[float, Quantity("m", -1e3, 1e3, NONE)] = 1.0
 
 
-SHAPES = ("stribeck_velocity", "stribeck_exponent", "cogging_pitch", "cogging_phase", *FRAME)
+STOPS = ("stop_low", "stop_high")
+"""Positions of the end stops."""
+SHAPES = (
+    "stribeck_velocity",
+    "stribeck_exponent",
+    "cogging_pitch",
+    "cogging_phase",
+    *FRAME,
+    *STOPS,
+)
 """Parameters of a guide that exert no force by themselves."""
 
 
@@ -329,10 +346,29 @@ def curve_size(guide: Guide) -> float:
 
 
 @compilable
-def position_force(guide: Guide, position: float, rest: float) -> float:
-    """Return spring, constant force, cogging and curve at a position, N.
+def beyond_stop(guide: Guide, position: float) -> float:
+    """Return how far a position lies beyond an end stop, m; 0 between the stops."""
+    return max(position - guide.stop_high, 0.0) + min(position - guide.stop_low, 0.0)
 
-    F = stiffness·(x − rest) + offset + cogging·sin(2π·x/cogging_pitch + cogging_phase) + curve.
+
+@compilable
+def quick_damping(guide: Guide, position: float, velocity: float) -> float:
+    """Return the coefficient of the damping that follows the velocity at once, Ns/m.
+
+    It is drag·|v|, and that of an end stop where the position is beyond it.
+    """
+    coefficient = guide.drag * abs(velocity)
+    if guide.stop_damping != 0.0 and beyond_stop(guide, position) != 0.0:
+        coefficient += guide.stop_damping
+    return coefficient
+
+
+@compilable
+def position_force(guide: Guide, position: float, rest: float) -> float:
+    """Return spring, constant force, cogging, curve and end stops at a position, N.
+
+    F = stiffness·(x − rest) + offset + cogging·sin(2π·x/cogging_pitch + cogging_phase) + curve
+    + stop_stiffness·s(x), with the way s(x) beyond an end stop.
     """
     force = guide.stiffness * (position - rest) + guide.offset
     if has_curve(guide):
@@ -341,6 +377,8 @@ def position_force(guide: Guide, position: float, rest: float) -> float:
         force += guide.cogging * math.sin(
             2.0 * math.pi * position / guide.cogging_pitch + guide.cogging_phase
         )
+    if guide.stop_stiffness != 0.0:
+        force += guide.stop_stiffness * beyond_stop(guide, position)
     return force
 
 

@@ -13,6 +13,7 @@ from rigtwin.components import (
     body,
     computer,
     conditioning,
+    end_stops,
     guide,
     mass,
     mount,
@@ -25,9 +26,35 @@ from rigtwin.components.effect import Effect, Kind
 from rigtwin.components.plant import Plant
 from rigtwin.errors import RigtwinError
 
+MODULES = (
+    guide,
+    end_stops,
+    mount,
+    mass,
+    body,
+    rotor,
+    tyre,
+    conditioning,
+    servo,
+    schedule,
+    computer,
+)
+"""Modules that define kinds of effect, in the order in which effects are listed."""
 KINDS: tuple[Kind, ...] = tuple(
     kind
-    for module in (guide, mount, mass, body, rotor, tyre, conditioning, servo, schedule, computer)
+    for module in (
+        guide,
+        end_stops,
+        mount,
+        mass,
+        body,
+        rotor,
+        tyre,
+        conditioning,
+        servo,
+        schedule,
+        computer,
+    )
     for kind in module.KINDS
 )
 

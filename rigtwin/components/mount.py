@@ -16,7 +16,15 @@ from typing import NamedTuple
 
 from controllers.compiled import compilable
 from rigtwin.components.effect import Kind, around_nominal
-from rigtwin.components.guide import Guide, curve_size, damping, dry_limits, position_force, slide
+from rigtwin.components.guide import (
+    Guide,
+    curve_size,
+    damping,
+    dry_limits,
+    position_force,
+    quick_damping,
+    slide,
+)
 from rigtwin.components.guide_step import GuideStep
 
 MOST = 60
@@ -61,7 +69,7 @@ def resist_at(
     dry, by = slide(position - state.slider, half, guide_step.spring, limits[0], limits[1])
     relaxed = viscous + guide_step.share * (damping(guide, v) * v - viscous)
     force = position_force(guide, position, guide_step.rest) + dry + relaxed
-    return force + guide.drag * v * abs(v), by, relaxed
+    return force + quick_damping(guide, position, v) * v, by, relaxed
 
 
 @compilable

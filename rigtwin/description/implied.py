@@ -48,6 +48,7 @@ PRESCRIBED = [
     "load_friction",
     "drag",
     "position_force",
+    "end_stops",
 ]
 """Effects at coupled joints with prescribed motion."""
 PRESCRIBED_FORCE = ["gain", "lag", "delay"]
@@ -60,6 +61,7 @@ FREE = [
     "stribeck",
     "load_friction",
     "position_force",
+    "end_stops",
 ]
 """Effects at coupled joints that are free to move."""
 FREE_SERVO = [

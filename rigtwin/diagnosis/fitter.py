@@ -39,7 +39,7 @@ REFINED_STARTS = 3
 """Largest number of starts of a single effect that are refined."""
 START_SHORTFALL = 0.5
 """A start is refined if it gains at most this share less than the best start."""
-LIMITS = ("saturation", "rate_limit", "resonance", "force_limit")
+LIMITS = ("saturation", "rate_limit", "resonance", "force_limit", "end_stops")
 """Kinds whose response does not scale with their magnitude."""
 CACHED_RESPONSES = 256
 """Number of cached responses beside a fit."""

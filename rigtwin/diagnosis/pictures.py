@@ -36,6 +36,7 @@ PICTURES: dict[str, str] = {
     "damping_gain": "velocity",
     "cogging": "position",
     "position_force": "position",
+    "end_stops": "position",
     "mass": "acceleration",
     "armature": "acceleration",
     "inertia": "acceleration",

@@ -30,6 +30,7 @@ RARE = (
     "mount",
     "cogging",
     "position_force",
+    "end_stops",
     "relaxation",
     "drag",
     "load_friction",

@@ -23,7 +23,7 @@ import numpy as np
 
 from controllers.compiled import inlined
 from rigtwin.components import Guide
-from rigtwin.components.guide import damping, dry_limits, position_force, slide
+from rigtwin.components.guide import damping, dry_limits, position_force, quick_damping, slide
 from rigtwin.components.guide_step import GuideStep
 from rigtwin.components.mount import MountState, give_way
 from rigtwin.components.servo import pull, push
@@ -126,7 +126,7 @@ def resist_explicitly(
             work.guide_force[g] -= hold_back(contacts, g, guide, load, h, state, place)
             continue
         share = h / (guide.relaxation + h)
-        damped = share * damping(guide, rate) + guide.drag * abs(rate)
+        damped = share * damping(guide, rate) + quick_damping(guide, place, rate)
         mass = contacts.inertia[g] / h
         implicit = max(0.5, 1.0 - mass / damped) if damped > 0.0 else 0.5
         work.damped[g], work.implicit[g] = damped, implicit

@@ -14,6 +14,7 @@ from rigtwin.components import (
     component_of,
 )
 from rigtwin.components.conditioning import actuator, condition_all, hold
+from rigtwin.components.end_stops import soften_stops
 from rigtwin.components.guide import Friction, acts, friction, friction_size
 from rigtwin.components.plant import Plant
 from rigtwin.components.sensors import sensor_of
@@ -158,8 +159,11 @@ class JointDrives:
         layout = self._layout
         # Rigid dry friction has no spring of its own. A numerical one is as stiff as the step
         # resolves; it keeps the friction single-valued, so that a sticking joint stays put.
-        guides = [component_of(plant, name, Guide) for name in layout.guides]
         h = self._period / self._steps
+        guides = [
+            soften_stops(component_of(plant, name, Guide), float(mass), h)
+            for name, mass in zip(layout.guides, self._loosest, strict=True)
+        ]
         dry = [friction(guide) for guide in guides]
         springs = np.empty(len(guides))
         for number, (name, guide) in enumerate(zip(layout.guides, guides, strict=True)):

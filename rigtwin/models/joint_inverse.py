@@ -6,7 +6,7 @@ Nothing is integrated but the friction elements, whose state follows from the mo
 
 from __future__ import annotations
 
-from rigtwin.components.guide import damping, dry_limits, position_force, slide
+from rigtwin.components.guide import damping, dry_limits, position_force, quick_damping, slide
 from rigtwin.components.guide_step import GuideStep
 from rigtwin.components.mount import MountState, give_way
 from rigtwin.models.joint_motion import Inertia, gravity
@@ -45,7 +45,7 @@ def resist(guide_step: GuideStep, motion: Array, out: Array) -> None:
         dry, by = slide(x - slider, half, guide_step.spring, forward, backward)
         slider += by
         viscous += guide_step.share * (damping(guide, v) * v - viscous)
-        out[tick] = transmitted + dry + viscous + guide.drag * v * abs(v)
+        out[tick] = transmitted + dry + viscous + quick_damping(guide, x, v) * v
 
 
 @kernel
@@ -62,7 +62,7 @@ def resist_at_once(guide_step: GuideStep, motion: Array, out: Array) -> None:
         forward, backward = dry_limits(guide_step.dry_friction, v, transmitted)
         dry = forward if v > 0.0 else (-backward if v < 0.0 else 0.0)
         viscous += guide_step.share * (damping(guide, v) * v - viscous)
-        out[tick] = transmitted + dry + viscous + guide.drag * v * abs(v)
+        out[tick] = transmitted + dry + viscous + quick_damping(guide, x, v) * v
 
 
 @kernel

@@ -13,6 +13,7 @@ import numpy as np
 
 from rigtwin.components import PUSHERS, Guide, Mass, PositionActuator, Rotor, Schedule, component_of
 from rigtwin.components.conditioning import actuator, condition_all, hold
+from rigtwin.components.end_stops import soften_stops
 from rigtwin.components.guide_step import guide_step_of
 from rigtwin.components.plant import Plant, select
 from rigtwin.components.schedule import follow, scheduled_force
@@ -350,6 +351,7 @@ class JointSimulation:
         play = play_of(mover)
         steps = self._steps * (CONTACT_STEPS if play.half > 0.0 else 1)
         h = self._period / steps
+        guide = soften_stops(guide, inertia.mass, h)
         # Dry friction without a spring of its own gets the stiffest one that the step resolves.
         rigid = RIGID * inertia.mass / h**2
         spring = rigid if guide.compliance <= 0.0 else min(1.0 / guide.compliance, rigid)

@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 
 from controllers.compiled import compilable, inlined
-from rigtwin.components.guide import damping, dry_limits, position_force, slide
+from rigtwin.components.guide import damping, dry_limits, position_force, quick_damping, slide
 from rigtwin.components.guide_step import GuideStep
 from rigtwin.components.servo import Play
 
@@ -60,7 +60,7 @@ def step_joint(
     h, share, half = guide_step.step, guide_step.share, 0.5 * guide.backlash
     coefficient = damping(guide, v)
     load = outer - position_force(guide, x, guide_step.rest) - (1.0 - share) * viscous
-    damped = h * (share * coefficient + guide.drag * abs(v) + held_by)
+    damped = h * (share * coefficient + quick_damping(guide, x, v) + held_by)
     # Implicit share of the damping: the midpoint rule's ½ until d·h = 2m, where it would start to
     # oscillate, and more beyond.
     ahead = 1.0 - mass / damped if damped > 2.0 * mass else 0.5

@@ -14,7 +14,14 @@ import numpy as np
 
 from rigtwin.components import Guide
 from rigtwin.components.conditioning import actuator, condition, hold
-from rigtwin.components.guide import damping, dry_limits, friction, position_force, slide
+from rigtwin.components.guide import (
+    damping,
+    dry_limits,
+    friction,
+    position_force,
+    quick_damping,
+    slide,
+)
 from rigtwin.components.guide_step import guide_step_of
 from rigtwin.components.mount import MountState, give_way
 from rigtwin.components.plant import Plant
@@ -111,7 +118,7 @@ class MujocoModel(JointSimulation):
             rubbed, by = slide(x - slider, 0.5 * guide.backlash, 1.0 / softest, forward, backward)
             slider += by
             viscous += share * (damping(guide, v) * v - viscous)
-            out[2, tick] = load + rubbed + viscous + guide.drag * v * abs(v)
+            out[2, tick] = load + rubbed + viscous + quick_damping(guide, x, v) * v
         return out
 
     def integrate_pushed(
@@ -211,7 +218,7 @@ class _Passive:
             data.qfrc_applied[at] = -self._hold_back(x, load)
             return
         forward, backward = dry_limits(self._dry, v, load)
-        force = -position_force(guide, x, self._rest) - guide.drag * v * abs(v)
+        force = -position_force(guide, x, self._rest) - quick_damping(guide, x, v) * v
         if guide.relaxation > 0.0:
             self._viscous += self._share * (damping(guide, v) * v - self._viscous)
             force -= self._viscous
