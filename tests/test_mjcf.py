@@ -8,7 +8,8 @@ import pytest
 
 import rigtwin
 from rigtwin.cli import main
-from rigtwin.description.mjcf import Change, Document, write_mjcf
+from rigtwin.description.mjcf import Change, write_mjcf
+from rigtwin.description.mjcf_text import Document
 from tests.helpers.described import TOML, described
 
 MODEL = """<!-- a bench, "as it stands" -->

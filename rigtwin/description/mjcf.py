@@ -1,14 +1,11 @@
-"""Writer of the user's MJCF with changed values. Only the changed attributes are rewritten; every
-other byte of the file, with its comments and layout, stays the same."""
+"""Writer of the user's MJCF with changed values. Only the changed attributes are rewritten."""
 
 from __future__ import annotations
 
 import math
-import re
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from xml.parsers import expat
 
 import mujoco
 import numpy as np
@@ -18,6 +15,7 @@ from rigtwin.components.quantity import UNLIMITED
 from rigtwin.components.servo import PUSHERS, pusher_of
 from rigtwin.description.machine import Component, Machine
 from rigtwin.description.mechanism import Mechanism
+from rigtwin.description.mjcf_text import PARENTS, Document, Tag
 from rigtwin.errors import RigtwinError
 from rigtwin.files import atomic_write
 
@@ -28,144 +26,12 @@ ATTRIBUTES: dict[type, dict[str, str]] = {
     Servo: {"position_gain": "kp", "damping_gain": "kv"},
 }
 """Type of component → parameter → attribute of its joint, tendon or position actuator."""
-PARENTS = {"joint": "body", "tendon": "tendon", "actuator": "actuator"}
-"""Element of a description → tag that encloses the element's tag."""
+STOP = ("stop_stiffness", "stop_damping", "stop_low", "stop_high")
+"""Parameters of a guide's end stops, which are written together."""
+SOFTEST = 1e-4
+"""Impedance of a joint limit that is a spring: the smallest that MuJoCo takes."""
 INERTIAL = ("mass", "diaginertia", "fullinertia", "density")
 """Attributes that are proportional to the mass."""
-
-
-@dataclass(eq=False)
-class Tag:
-    """Start tag of an element.
-
-    Attributes
-    ----------
-    name
-        Name of the tag, such as `joint`.
-    attributes
-        Attribute → value.
-    first
-        Offset of its first byte in the file.
-    parent
-        Tag that encloses it; None for the root.
-    children
-        Tags that it encloses directly.
-    """
-
-    name: str
-    attributes: dict[str, str]
-    first: int
-    parent: Tag | None
-    children: list[Tag] = field(default_factory=list)
-
-    def walk(self) -> Iterator[Tag]:
-        """Yield the tag and all tags inside of it."""
-        yield self
-        for child in self.children:
-            yield from child.walk()
-
-
-class Document:
-    """Text of an MJCF, whose attributes can be set.
-
-    Attributes
-    ----------
-    path
-        Path of the MJCF.
-    root
-        Tag of the root.
-    """
-
-    def __init__(self, path: Path) -> None:
-        """Read a file. Raises RigtwinError if it cannot be read or is no XML."""
-        self.path = path
-        try:
-            self._text = path.read_bytes()
-        except OSError as error:
-            raise RigtwinError(f"cannot read {path}: {error.strerror}") from None
-        self._edits: dict[int, dict[str, str]] = {}
-        # expat states the byte offset of every tag, which a tree of elements would not keep.
-        stack: list[Tag] = []
-        parser = expat.ParserCreate()
-
-        def begin(name: str, attributes: dict[str, str]) -> None:
-            parent = stack[-1] if stack else None
-            tag = Tag(name, attributes, parser.CurrentByteIndex, parent)
-            if parent is not None:
-                parent.children.append(tag)
-            else:
-                self.root = tag
-            stack.append(tag)
-
-        def end(_: str) -> None:
-            stack.pop()
-
-        parser.StartElementHandler, parser.EndElementHandler = begin, end
-        try:
-            parser.Parse(self._text, True)
-        except expat.ExpatError as error:
-            raise RigtwinError(f"model {path}: {error}") from None
-
-    def find(self, element: str, name: str) -> Tag:
-        """Return the tag of a named joint, tendon, actuator or body.
-
-        Raises RigtwinError if the file has none, which may then be in an included file.
-        """
-        for tag in self.root.walk():
-            matches = tag.name == "body" if element == "body" else self._is_of(tag, element)
-            if matches and tag.attributes.get("name") == name:
-                return tag
-        raise RigtwinError(
-            f"{self.path.name} has no {element} {name!r} itself; one that it includes may have it, "
-            "and would have to be changed there"
-        )
-
-    @staticmethod
-    def _is_of(tag: Tag, element: str) -> bool:
-        """Return whether a tag is a joint, tendon or actuator of the model."""
-        # Defaults and keyframes use the same tag names, so the enclosing tag decides.
-        inside = tag.parent is not None and tag.parent.name == PARENTS[element]
-        return inside and (element != "joint" or tag.name == "joint")
-
-    def set(self, tag: Tag, attribute: str, value: str) -> None:
-        """Set an attribute of a tag."""
-        self._edits.setdefault(tag.first, {})[attribute] = value
-
-    def text(self) -> bytes:
-        """Return the text of the file with the attributes that were set."""
-        out = self._text
-        # From the end to the beginning, so that the offsets of earlier tags stay valid.
-        for first in sorted(self._edits, reverse=True):
-            last = _end_of_tag(out, first)
-            tag = out[first:last].decode()
-            for attribute, value in self._edits[first].items():
-                tag = _with_attribute(tag, attribute, value)
-            out = out[:first] + tag.encode() + out[last:]
-        return out
-
-
-def _end_of_tag(text: bytes, first: int) -> int:
-    """Return the offset after a start tag. A `>` inside of quotes does not end the tag."""
-    quote = 0
-    for place in range(first, len(text)):
-        byte = text[place]
-        if quote:
-            quote = 0 if byte == quote else quote
-        elif byte in b"\"'":
-            quote = byte
-        elif byte == ord(">"):
-            return place + 1
-    return len(text)
-
-
-def _with_attribute(tag: str, attribute: str, value: str) -> str:
-    """Return a start tag with an attribute replaced or appended."""
-    match = re.search(rf"(\s{attribute}\s*=\s*)(\"[^\"]*\"|'[^']*')", tag)
-    if match is not None:
-        return tag[: match.start()] + f'{match.group(1)}"{value}"' + tag[match.end() :]
-    end = re.search(r"\s*/?>$", tag)
-    assert end is not None
-    return f'{tag[: end.start()]} {attribute}="{value}"{tag[end.start() :]}'
 
 
 @dataclass(frozen=True)
@@ -236,6 +102,9 @@ def _apply(document: Document, machine: Machine, change: Change, changes: Sequen
             return False
         document.set(tag, attribute, _number(change.value * _factor_of(component, changes)))
         return True
+    if change.parameter in STOP and component.element == "joint":
+        _set_stops(document, machine, component, changes)
+        return True
     if component.component_type is Mass and change.parameter == "mass":
         nominal = component_of(machine.plant, component.name, Mass).mass
         # A body may consist of geoms without a mass of their own: all of them are scaled alike.
@@ -243,6 +112,35 @@ def _apply(document: Document, machine: Machine, change: Change, changes: Sequen
     if component.element == "actuator":
         return _apply_to_actuator(document, machine, component, change, changes)
     return False
+
+
+def _set_stops(
+    document: Document, machine: Machine, component: Component, changes: Sequence[Change]
+) -> None:
+    """Write end stops as the limits of a joint.
+
+    A limit of impedance d asks for a force f with f·(d·A + (1 − d)·D) = −k·s − c·v − d·a₀, with
+    `solreflimit` = (−k, −c), the way s beyond the limit, the exact inverse inertia A and its
+    approximation D [MuJoCo documentation, Computation, Constraint model]. For d → 0 it is a spring
+    of the stiffness k/D with a damper of c/D.
+    """
+    guide = component_of(machine.plant, component.name, Guide)
+    values = {name: float(getattr(guide, name)) for name in STOP}
+    values |= {c.parameter: c.value for c in changes if c.component == component.name}
+    mechanism = Mechanism(machine.model)
+    model, number = mechanism.model, mechanism.number("joint", component.mjcf)
+    light = float(model.dof_invweight0[model.jnt_dofadr[number]])
+    # The file states angles in degrees unless its compiler says otherwise.
+    compilers = [tag for tag in document.root.walk() if tag.name == "compiler"]
+    in_radians = any(tag.attributes.get("angle") == "radian" for tag in compilers)
+    unit = 1.0 if in_radians or not component.turns else math.degrees(1.0)
+    tag = document.find("joint", component.mjcf)
+    ends = (unit * values["stop_low"], unit * values["stop_high"])
+    reference = (-light * values["stop_stiffness"], -light * values["stop_damping"])
+    document.set(tag, "limited", "true")
+    document.set(tag, "range", " ".join(map(_number, ends)))
+    document.set(tag, "solreflimit", " ".join(map(_number, reference)))
+    document.set(tag, "solimplimit", f"{SOFTEST:g} {SOFTEST:g} 0.001")
 
 
 def _factor_of(component: Component, changes: Sequence[Change]) -> float:
