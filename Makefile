@@ -5,6 +5,8 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 OUT := out
+# Without stored bytecode, every process that a test starts would compile the package again.
+unexport PYTHONDONTWRITEBYTECODE
 
 help:
 	@echo "make demo       set up, record a rig with a defect, diagnose it, plot and film a drop test"
