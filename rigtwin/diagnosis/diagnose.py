@@ -329,7 +329,7 @@ def _has_residual(explanation: Explanation, evidence: Evidence, named: Sequence[
         if not is_timing(effect, values, evidence)
     }
     if set(named) == findings:
-        return posterior.has_unexplained_residual
+        return posterior.has_unexplained_residual and not explanation.leaves_noise
     # The named effects may be another scored hypothesis than the best one.
     identical = [
         hypothesis.scored

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rigtwin.components import Effect
+from rigtwin.diagnosis.confirmation import confirm
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.first_look import FirstLook
 from rigtwin.diagnosis.fit import Fit, clashes, is_possible, leave_one_out
@@ -37,6 +38,9 @@ class Explanation:
         Nested fits that lead to the best hypothesis, the fit of a single effect first.
     ended_early
         Whether the effort was spent before all hypotheses were tried.
+    leaves_noise
+        Whether a confirmation has shown that the best hypothesis leaves noise alone, whatever its
+        approximate score says.
     """
 
     posterior: HypothesisPosterior
@@ -44,6 +48,7 @@ class Explanation:
     unobservable: tuple[Effect, ...]
     chain: tuple[Fit, ...]
     ended_early: bool
+    leaves_noise: bool
 
 
 def candidates(evidence: Evidence) -> list[Effect]:
@@ -92,17 +97,27 @@ def explain(
         posterior = search.run()
         best = posterior.best.fit
         fit = best
+        leaves_noise = False
+        if best.effects and search.is_approximate and not search.ended_early:
+            confirmed = confirm(evidence, best, search.coarse, len(effects), thresholds, threads)
+            leaves_noise = confirmed.leaves_noise
+            posterior = search.settle_on(confirmed.fit, leaves_noise)
+            best, fit = posterior.best.fit, confirmed.fit
         # A search on thinned ticks is followed by one fit to all of them.
-        if best.effects and search.fine.evidence.models is not evidence.models:
+        if best.effects and (
+            set(best.effects) != set(fit.effects)
+            or (fit is best and search.fine.evidence.models is not evidence.models)
+        ):
             # Restarts nearby are a search as well, for which no effort may be left.
             restarts = () if search.ended_early else PERTURBATIONS
-            fit = Fitter(evidence).refit_with_tolerances(best, restarts)
+            fit, leaves_noise = Fitter(evidence).refit_with_tolerances(best, restarts), False
         return Explanation(
             posterior=posterior,
             fit=fit,
             unobservable=_unobservable(search, posterior),
             chain=tuple(_nest(search, fit)),
             ended_early=search.ended_early,
+            leaves_noise=leaves_noise,
         )
 
 

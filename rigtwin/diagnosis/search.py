@@ -111,6 +111,8 @@ class HypothesisSearch:
         Screened candidates.
     ended_early
         Whether the effort was spent before all hypotheses were tried.
+    is_approximate
+        Whether errors of initial states are corrected to first order.
     """
 
     evidence: Evidence
@@ -130,7 +132,7 @@ class HypothesisSearch:
         searched = copy(self.evidence.thin())
         searched.effort = self._effort
         self.coarse = Fitter(searched.halve_steps())
-        self._is_approximate = any(model.has_linear_starts for model in searched.models)
+        self.is_approximate = any(model.has_linear_starts for model in searched.models)
         self.fine = Fitter(searched)
         self._scorer = Scorer(self.fine)
         self._extended: set[frozenset[Effect]] = set()
@@ -256,7 +258,7 @@ class HypothesisSearch:
         posterior = self.posterior
         if not posterior.has_unexplained_residual:
             return False
-        if self._is_approximate:
+        if self.is_approximate:
             remaining = float(np.max(posterior.remaining(posterior.best)))
             if remaining <= self.thresholds.negligible_share:
                 return False
@@ -290,6 +292,34 @@ class HypothesisSearch:
             known = self.pool.get(key)
             if known is None or _rank(scored) < _rank(known):
                 self.pool[key] = scored
+
+    def settle_on(self, fit: Fit, leaves_noise: bool) -> HypothesisPosterior:
+        """Discard hypotheses whose further effects a confirmation has shown to be superfluous.
+
+        Parameters
+        ----------
+        fit
+            What is left of the best hypothesis.
+        leaves_noise
+            Whether it leaves noise alone, so that no hypothesis needs more effects.
+
+        Returns
+        -------
+        HypothesisPosterior
+            All other hypotheses with their weights.
+        """
+        before, confirmed = frozenset(self.posterior.best.fit.effects), frozenset(fit.effects)
+        if confirmed != before:
+            if confirmed not in self.pool:
+                self._add([self.fine.refine(fit.effects, fit.values)])
+            superfluous = [
+                known
+                for known in self.pool
+                if confirmed < known and (leaves_noise or known == before)
+            ]
+            for known in superfluous:
+                del self.pool[known]
+        return self.posterior
 
     def _settle(self, fits: Sequence[Fit]) -> None:
         """Refit with the tolerances estimated at the fit, on fine evidence, and score."""

@@ -1,0 +1,103 @@
+"""Confirmation of a hypothesis that an approximate search has found, on the evidence itself.
+
+A search corrects initial states to first order. What that leaves is a residual that only resembles
+one of the machine, and an effect may have been added for its sake. So the best hypothesis is fitted
+exactly, and with each of its effects left out where it leaves little more than noise.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from rigtwin.diagnosis.evidence import Evidence
+from rigtwin.diagnosis.fit import Fit, is_possible, leave_one_out
+from rigtwin.diagnosis.fitter import PERTURBATIONS, Fitter
+from rigtwin.diagnosis.posterior import HypothesisPosterior
+from rigtwin.diagnosis.scoring import Scorer
+from rigtwin.diagnosis.threads import Threads
+from rigtwin.diagnosis.thresholds import Thresholds
+
+NEAR_NOISE = 2.0
+"""Ratio of the misfit to that of noise up to which an approximation may have feigned an effect.
+What an incomplete model leaves is larger, and so are the effects of which it consists."""
+HOPELESS = 10.0
+"""Factor on the misfit beyond which the search itself has shown that an effect is needed."""
+
+
+@dataclass(frozen=True)
+class Confirmation:
+    """Hypothesis that is left of one that was confirmed.
+
+    Attributes
+    ----------
+    fit
+        Its exact fit.
+    leaves_noise
+        Whether it leaves nothing but noise and declared error.
+    """
+
+    fit: Fit
+    leaves_noise: bool
+
+
+def confirm(
+    evidence: Evidence,
+    fit: Fit,
+    coarse: Fitter,
+    candidates: int,
+    thresholds: Thresholds,
+    threads: Threads,
+) -> Confirmation:
+    """Fit a hypothesis exactly, and leave out the effects that are not worth their price then.
+
+    Parameters
+    ----------
+    evidence
+        Evidence without a search's approximations.
+    fit
+        Approximate fit of the hypothesis, with at least one effect.
+    coarse
+        Fitter of the search.
+    candidates
+        Number of effects that were searched.
+    thresholds
+        Thresholds of the score.
+    threads
+        Threads that fit in parallel.
+
+    Returns
+    -------
+    Confirmation
+        The hypothesis, or what is left of it.
+    """
+    fitter = Fitter(evidence)
+    scorer = Scorer(fitter)
+    pool = [scorer.score(fitter.nominal_fit)]
+    best = fitter.refit_with_tolerances(fit, PERTURBATIONS)
+    while True:
+        pool.append(scorer.score(best))
+        posterior = HypothesisPosterior(pool, fitter, candidates, thresholds)
+        if len(best.effects) < 2 or best.misfit > NEAR_NOISE * evidence.expected:
+            break
+        rough = threads.map(
+            lambda start: coarse.refine(*start),
+            [
+                (effects, values)
+                for _, effects, values in leave_one_out(best)
+                if is_possible(effects, fitter.plant)
+            ],
+        )
+        starts = [
+            (fewer.effects, fewer.values)
+            for fewer in rough
+            if fewer.misfit < HOPELESS * max(fit.misfit, best.misfit)
+        ]
+        reduced = threads.map(
+            lambda start: fitter.refit_with_tolerances(fitter.refine(*start), ()), starts
+        )
+        scores = [scorer.score(fewer) for fewer in reduced]
+        costs = [posterior.cost(scored) for scored in scores]
+        if not costs or min(costs) >= posterior.cost(pool[-1]):
+            break
+        best = reduced[costs.index(min(costs))]
+    return Confirmation(best, not posterior.has_unexplained_residual)
