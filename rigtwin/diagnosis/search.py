@@ -294,7 +294,7 @@ class HypothesisSearch:
                 self.pool[key] = scored
 
     def settle_on(self, fit: Fit, leaves_noise: bool) -> HypothesisPosterior:
-        """Discard hypotheses whose further effects a confirmation has shown to be superfluous.
+        """Discard hypotheses that a confirmation has shown to fit the search's approximation.
 
         Parameters
         ----------
@@ -312,13 +312,16 @@ class HypothesisSearch:
         if confirmed != before:
             if confirmed not in self.pool:
                 self._add([self.fine.refine(fit.effects, fit.values)])
-            superfluous = [
-                known
-                for known in self.pool
-                if confirmed < known and (leaves_noise or known == before)
-            ]
-            for known in superfluous:
-                del self.pool[known]
+            costs = {
+                frozenset(weighted.scored.fit.effects): weighted.cost
+                for weighted in self.posterior.ranking
+            }
+            for known, cost in costs.items():
+                # What the search preferred to an explanation of everything, it preferred for the
+                # sake of its own approximation.
+                preferred = known != confirmed and cost <= costs[confirmed]
+                if known == before or (leaves_noise and (confirmed < known or preferred)):
+                    del self.pool[known]
         return self.posterior
 
     def _settle(self, fits: Sequence[Fit]) -> None:
