@@ -299,7 +299,7 @@ class HypothesisSearch:
         Parameters
         ----------
         fit
-            What is left of the best hypothesis.
+            Exact fit of the effects of the best hypothesis that were confirmed.
         leaves_noise
             Whether it leaves noise alone, so that no hypothesis needs more effects.
 
