@@ -13,6 +13,8 @@ INSETS = (0.01, 0.05, 0.15)
 """Distances of the first guesses from either end of the range, as shares of it."""
 ONE_SIDED = 0.05
 """Distance of the first guess of a single stop, as a share of the range."""
+DEEPEST = 0.3
+"""Largest distance of a stop from its end of the range, as a share of it."""
 DAMPING = 0.5
 """First guess of the damping, in units of force per speed."""
 
@@ -55,8 +57,10 @@ def _starts(context: Context) -> Starts:
         0.002 * stroke,
         0.002 * stroke,
     )
-    reach = (low - stroke, high + stroke)
-    return Starts(tuple(starts), steps, bounds=((0.0, 1e12), (0.0, 1e9), reach, reach))
+    # Stops that meet would be a linear spring.
+    lower = (low - stroke, low + DEEPEST * stroke)
+    upper = (high - DEEPEST * stroke, high + stroke)
+    return Starts(tuple(starts), steps, bounds=((0.0, 1e12), (0.0, 1e9), lower, upper))
 
 
 KINDS = (
