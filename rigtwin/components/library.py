@@ -40,23 +40,7 @@ MODULES = (
     computer,
 )
 """Modules that define kinds of effect, in the order in which effects are listed."""
-KINDS: tuple[Kind, ...] = tuple(
-    kind
-    for module in (
-        guide,
-        end_stops,
-        mount,
-        mass,
-        body,
-        rotor,
-        tyre,
-        conditioning,
-        servo,
-        schedule,
-        computer,
-    )
-    for kind in module.KINDS
-)
+KINDS: tuple[Kind, ...] = tuple(kind for module in MODULES for kind in module.KINDS)
 
 
 def candidates(plant: Plant) -> Iterator[Effect]:

@@ -33,7 +33,7 @@ class Confirmation:
     fit
         Its exact fit.
     leaves_noise
-        Whether it leaves nothing but noise and declared error.
+        Whether the residual of that fit is noise and declared error alone.
     """
 
     fit: Fit

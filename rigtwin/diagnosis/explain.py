@@ -95,22 +95,22 @@ def explain(
     with Threads(progress) as threads:
         search = HypothesisSearch(evidence, effects, thresholds, threads, first_look)
         posterior = search.run()
-        best = posterior.best.fit
-        fit = best
-        leaves_noise = False
-        if best.effects and search.is_approximate and not search.ended_early:
-            confirmed = confirm(evidence, best, search.coarse, len(effects), thresholds, threads)
-            leaves_noise = confirmed.leaves_noise
-            posterior = search.settle_on(confirmed.fit, leaves_noise)
-            best, fit = posterior.best.fit, confirmed.fit
+        fit, leaves_noise = posterior.best.fit, False
+        if fit.effects and search.is_approximate and not search.ended_early:
+            confirmed = confirm(evidence, fit, search.coarse, len(effects), thresholds, threads)
+            posterior = search.settle_on(confirmed.fit, confirmed.leaves_noise)
+            fit = posterior.best.fit
+            if set(fit.effects) == set(confirmed.fit.effects):
+                fit, leaves_noise = confirmed.fit, confirmed.leaves_noise
         # A search on thinned ticks is followed by one fit to all of them.
-        if best.effects and (
-            set(best.effects) != set(fit.effects)
-            or (fit is best and search.fine.evidence.models is not evidence.models)
+        if (
+            fit is posterior.best.fit
+            and fit.effects
+            and search.fine.evidence.models is not evidence.models
         ):
             # Restarts nearby are a search as well, for which no effort may be left.
             restarts = () if search.ended_early else PERTURBATIONS
-            fit, leaves_noise = Fitter(evidence).refit_with_tolerances(best, restarts), False
+            fit = Fitter(evidence).refit_with_tolerances(fit, restarts)
         return Explanation(
             posterior=posterior,
             fit=fit,

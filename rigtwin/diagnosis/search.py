@@ -301,12 +301,12 @@ class HypothesisSearch:
         fit
             Exact fit of the effects of the best hypothesis that were confirmed.
         leaves_noise
-            Whether it leaves noise alone, so that no hypothesis needs more effects.
+            Whether the residual of that fit is noise alone. No hypothesis then needs more effects.
 
         Returns
         -------
         HypothesisPosterior
-            All other hypotheses with their weights.
+            Weights of the hypotheses that are kept.
         """
         before, confirmed = frozenset(self.posterior.best.fit.effects), frozenset(fit.effects)
         if confirmed != before:
