@@ -10,6 +10,7 @@ import pytest
 
 import rigtwin
 from rigtwin.description.mjcf import Change, write_mjcf
+from rigtwin.errors import RigtwinError
 
 MODEL = """<mujoco model="stopped"><option timestep="0.001" integrator="implicitfast"/><worldbody>
 <body name="carriage"><joint name="axis" type="slide" axis="1 0 0" damping="20"{limits}/>
@@ -86,3 +87,12 @@ observe = ["torque"]
     data.qpos[0], data.qvel[0] = 0.62, 0.5
     mujoco.mj_forward(model, data)
     assert data.qfrc_constraint[0] == pytest.approx(-400.0 * 0.02 - 3.0 * 0.5, rel=1e-3)
+
+
+def test_stops_in_the_wrong_order_are_refused() -> None:
+    with pytest.raises(
+        RigtwinError, match=r"rail\.stop_low 0\.1: expected less than stop_high -0\.1"
+    ):
+        rigtwin.run(
+            "cart-pole", "pushes", effects=["end_stops@rail=5000,stop_low=0.1,stop_high=-0.1"]
+        )

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 from controllers.quantity import Choice, Quantity, fields
 
 UNLIMITED = 1e9
@@ -20,4 +23,36 @@ STRIBECK_EXPONENT = Quantity(
 )
 """Exponent of the Stribeck curve, a parameter of motor, rail and guide."""
 
-__all__ = ["MJCF", "NONE", "STRIBECK_EXPONENT", "UNLIMITED", "Choice", "Quantity", "fields"]
+ORDERED = (("command_low", "command_high"), ("stop_low", "stop_high"))
+"""Pairs of parameters of one component of which the first is the smaller one."""
+
+
+def describe_disorder(values: Mapping[str, Any]) -> str | None:
+    """Describe the first pair of parameters whose values are in the wrong order.
+
+    Parameters
+    ----------
+    values
+        Parameters of a component, by name.
+
+    Returns
+    -------
+    str or None
+        What is wrong and what was expected; None if nothing is wrong.
+    """
+    for low, high in ORDERED:
+        if low in values and not values[low] < values[high]:
+            return f"{low} {values[low]:g}: expected less than {high} {values[high]:g}"
+    return None
+
+
+__all__ = [
+    "MJCF",
+    "NONE",
+    "STRIBECK_EXPONENT",
+    "UNLIMITED",
+    "Choice",
+    "Quantity",
+    "describe_disorder",
+    "fields",
+]

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
-from rigtwin.components.quantity import Choice, Quantity, fields
+from rigtwin.components.quantity import Choice, Quantity, describe_disorder, fields
 from rigtwin.description.configuration import Configuration, groups, parameters
 from rigtwin.errors import RigtwinError
 from rigtwin.files import parse_toml
@@ -110,6 +110,8 @@ def override(
             group = group._replace(
                 **{key: check_value(f"{group_name}.{key}", value, meanings[key])}
             )
+        if (disorder := describe_disorder(group._asdict())) is not None:
+            raise RigtwinError(f"{group_name}.{disorder}")
         if group_name in plant._fields:
             plant = plant._replace(**{group_name: group})
         else:

@@ -10,7 +10,7 @@ from typing import Any
 
 from rigtwin import components
 from rigtwin.components import KINDS, UNLIMITED
-from rigtwin.components.quantity import Quantity, fields
+from rigtwin.components.quantity import Quantity, describe_disorder, fields
 from rigtwin.components.sensors import MEASURES
 from rigtwin.description.actuator_law import VELOCITY_SERVO
 from rigtwin.description.machine import Component, ReplayOf
@@ -338,12 +338,8 @@ class Components:
                 )
         if kind == "force actuator" and component.constant == 0.0:
             self.mistakes.note(where, "constant 0: expected another number")
-        if kind in (*PUSHING, "position actuator"):
-            low, high = component.command_low, component.command_high
-            if not low < high:
-                self.mistakes.note(
-                    where, f"command_low {low:g}: expected less than command_high {high:g}"
-                )
+        if (disorder := describe_disorder(values)) is not None:
+            self.mistakes.note(where, disorder)
         return component
 
     def _read_mjcf(self, where: str, kind: str, element: str, mjcf: str, joint: str) -> Any:
