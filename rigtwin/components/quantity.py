@@ -38,7 +38,7 @@ def describe_disorder(values: Mapping[str, Any]) -> str | None:
     Returns
     -------
     str or None
-        What is wrong and what was expected; None if nothing is wrong.
+        Description of the wrong order and the right one; None if no pair is wrong.
     """
     for low, high in ORDERED:
         if low in values and not values[low] < values[high]:
