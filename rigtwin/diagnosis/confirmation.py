@@ -72,32 +72,28 @@ def confirm(
     """
     fitter = Fitter(evidence)
     scorer = Scorer(fitter)
-    pool = [scorer.score(fitter.nominal_fit)]
-    best = fitter.refit_with_tolerances(fit, PERTURBATIONS)
-    while True:
-        pool.append(scorer.score(best))
-        posterior = HypothesisPosterior(pool, fitter, candidates, thresholds)
-        if len(best.effects) < 2 or best.misfit > NEAR_NOISE * evidence.expected:
-            break
-        rough = threads.map(
-            lambda start: coarse.refine(*start),
-            [
-                (effects, values)
-                for _, effects, values in leave_one_out(best)
-                if is_possible(effects, fitter.plant)
-            ],
-        )
+    current = fitter.refit_with_tolerances(fit, PERTURBATIONS)
+    fits = [current]
+    most = HOPELESS * max(fit.misfit, current.misfit)
+    while len(current.effects) > 1 and current.misfit <= NEAR_NOISE * evidence.expected:
         starts = [
-            (fewer.effects, fewer.values)
-            for fewer in rough
-            if fewer.misfit < HOPELESS * max(fit.misfit, best.misfit)
+            (effects, values)
+            for _, effects, values in leave_one_out(current)
+            if is_possible(effects, fitter.plant)
         ]
+        rough = threads.map(lambda start: coarse.refine(*start), starts)
         reduced = threads.map(
-            lambda start: fitter.refit_with_tolerances(fitter.refine(*start), ()), starts
+            lambda fewer: fitter.refit_with_tolerances(
+                fitter.refine(fewer.effects, fewer.values), ()
+            ),
+            [fewer for fewer in rough if fewer.misfit < most],
         )
-        scores = [scorer.score(fewer) for fewer in reduced]
-        costs = [posterior.cost(scored) for scored in scores]
-        if not costs or min(costs) >= posterior.cost(pool[-1]):
+        if not reduced:
             break
-        best = reduced[costs.index(min(costs))]
-    return Confirmation(best, not posterior.has_unexplained_residual)
+        # The price of a value that may be nominal makes a set costly of which a subset is cheap: so
+        # the way goes by misfit, to its end.
+        current = min(reduced, key=lambda fewer: fewer.misfit)
+        fits += reduced
+    pool = [scorer.score(each) for each in (fitter.nominal_fit, *fits)]
+    posterior = HypothesisPosterior(pool, fitter, candidates, thresholds)
+    return Confirmation(posterior.best.fit, not posterior.has_unexplained_residual)
