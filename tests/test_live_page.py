@@ -140,7 +140,9 @@ def test_a_person_sees_the_gap_arise(tmp_path):
         assert tab.ask(f"{SHOWN}[0].scales.x.max - {SHOWN}[0].data[0].at(-1)") < 0.5
         tab.wait_for("document.getElementById('watch').textContent === 'alarm'")
         assert page.watch is not None
-        assert LATER < page.watch.judged < LATER + 2.0
+        assert page.watch.alarm is not None
+        # The time of the alarm itself depends on how busy the computer is.
+        assert page.watch.alarm.since == pytest.approx(LATER, abs=0.5)
         tab.wait_for(f"{NOTES}.includes('{EFFECT[0]}')")
         # Then the whole test, with its sliders.
         tab.wait_for("document.getElementById('overall')?.textContent", patience=60.0)

@@ -26,8 +26,13 @@ LATE_BY_TIME = ("lag", "delay")
 """Kinds with a single parameter, the delay of a signal."""
 IN_SERIES = ("compliance", "backlash")
 """Kinds that hide dry friction in series with them."""
-SECOND_ORDER = ("two_lags", "resonance")
-"""Kinds that a lag together with a delay resembles at low frequencies."""
+UNFOLDED = {
+    "two_lags": LATE_BY_TIME,
+    "resonance": LATE_BY_TIME,
+    "end_stops": ("stiffness", "position_force"),
+}
+"""Kinds that two others together resemble. At low frequencies a lag and a delay resemble an effect
+of second order. A spring that hardens resembles stops at its ends."""
 COMBINATIONS = 150
 """Largest number of combinations of starts that are simulated for one hypothesis."""
 REFINED = 2
@@ -91,16 +96,17 @@ def start_in_series(
 
 
 def start_unfolded(fitter: Fitter, leader: Fit, candidates: Sequence[Effect]) -> list[Start]:
-    """Start a lag and a delay in the place of an effect of second order.
+    """Start two effects in the place of one that they resemble together.
 
-    At low frequencies two lags or a resonance delay a signal as a lag and a delay together do.
+    The first effect of a hypothesis is the one that explains most alone, and neither of the two
+    may explain as much.
 
     Parameters
     ----------
     fitter
         Fitter of the evidence.
     leader
-        Fit whose effects of second order are replaced.
+        Fit whose effects are replaced in turn.
     candidates
         Candidate effects.
 
@@ -114,11 +120,12 @@ def start_unfolded(fitter: Fitter, leader: Fit, candidates: Sequence[Effect]) ->
         pair = [
             candidate
             for candidate in candidates
-            if candidate.group == effect.group and candidate.kind.name in LATE_BY_TIME
+            if candidate.group == effect.group
+            and candidate.kind.name in UNFOLDED.get(effect.kind.name, ())
         ]
         if (
-            effect.kind.name in SECOND_ORDER
-            and len(pair) == 2
+            len(pair) == 2
+            and not any(candidate in remaining for candidate in pair)
             and not any(clashes(candidate, remaining) for candidate in pair)
         ):
             starts.append(_start_pair(fitter, remaining, values, (pair[0], pair[1])))
