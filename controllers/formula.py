@@ -20,10 +20,10 @@ from controllers.compiled import compilable, compiled
 LONGEST = 4096
 """Largest number of ticks in the memory of a block."""
 
-# Codes of the operations; `run` tells them apart.
+# Codes of the operations: those without a memory, which `operate` tells apart, then the blocks.
 ADD, SUBTRACT, MULTIPLY, DIVIDE, NEGATE = range(5)
-ABSOLUTE, SIGN, SINE, COSINE, ROOT, SMALLER, LARGER = range(5, 12)
-DERIVATIVE, INTEGRAL, LOW_PASS, MEAN, DELAY, CLIP = range(12, 18)
+ABSOLUTE, SIGN, SINE, COSINE, ROOT, SMALLER, LARGER, CLIP = range(5, 13)
+DERIVATIVE, INTEGRAL, LOW_PASS, MEAN, DELAY = range(13, 18)
 PLAIN = {
     "abs": (ABSOLUTE, 1),
     "sign": (SIGN, 1),
@@ -277,6 +277,43 @@ class _Builder:
 
 
 @compilable
+def operate(code: int, x: float, y: float, z: float) -> float:
+    """Return the result of an operation without a memory.
+
+    code: one of those below `DERIVATIVE`; x, y, z: arguments, of which it uses the first ones.
+    """
+    value = x
+    if code == ADD:
+        value = x + y
+    elif code == SUBTRACT:
+        value = x - y
+    elif code == MULTIPLY:
+        value = x * y
+    elif code == DIVIDE:
+        # A formula must not stop the loop: x/0 is 0.
+        value = x / y if y != 0.0 else 0.0
+    elif code == NEGATE:
+        value = -x
+    elif code == ABSOLUTE:
+        value = abs(x)
+    elif code == SIGN:
+        value = 0.0 if x == 0.0 else math.copysign(1.0, x)
+    elif code == SINE:
+        value = math.sin(x)
+    elif code == COSINE:
+        value = math.cos(x)
+    elif code == ROOT:
+        value = math.sqrt(max(x, 0.0))
+    elif code == SMALLER:
+        value = min(x, y)
+    elif code == LARGER:
+        value = max(x, y)
+    elif code == CLIP:
+        value = min(max(x, y), z)
+    return value
+
+
+@compilable
 def run(operations: Any, registers: Any, memory: Any, period: float) -> float:
     """Return the value of a formula at one tick; registers and memory are changed.
 
@@ -290,35 +327,9 @@ def run(operations: Any, registers: Any, memory: Any, period: float) -> float:
         code = operations[number, 0]
         x = registers[operations[number, 1]]
         y = registers[operations[number, 2]]
-        z = registers[operations[number, 3]]
         slot = operations[number, 4]
-        if code == ADD:
-            value = x + y
-        elif code == SUBTRACT:
-            value = x - y
-        elif code == MULTIPLY:
-            value = x * y
-        elif code == DIVIDE:
-            # A formula must not stop the loop: x/0 is 0.
-            value = x / y if y != 0.0 else 0.0
-        elif code == NEGATE:
-            value = -x
-        elif code == ABSOLUTE:
-            value = abs(x)
-        elif code == SIGN:
-            value = 0.0 if x == 0.0 else math.copysign(1.0, x)
-        elif code == SINE:
-            value = math.sin(x)
-        elif code == COSINE:
-            value = math.cos(x)
-        elif code == ROOT:
-            value = math.sqrt(max(x, 0.0))
-        elif code == SMALLER:
-            value = min(x, y)
-        elif code == LARGER:
-            value = max(x, y)
-        elif code == CLIP:
-            value = min(max(x, y), z)
+        if code < DERIVATIVE:
+            value = operate(code, x, y, registers[operations[number, 3]])
         elif code == DERIVATIVE:
             value = 0.0 if math.isnan(memory[slot]) else (x - memory[slot]) / period
             memory[slot] = x

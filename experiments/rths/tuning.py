@@ -61,7 +61,7 @@ class Tunable:
 
     Attributes
     ----------
-    knobs : tuple of Knob
+    knobs : tuple of TunedParameter
         Parameters to tune.
     make : callable
         Function of the parameters, by name, that returns the law.
@@ -269,8 +269,8 @@ def tune_compensator(
     """
     _check_counts(plants=(plants, 1), held_out_plants=(held_out_plants, 1))
     _check_counts(evaluations=(evaluations, 3))
-    tunable, ground = _find_tunable(name), ground_motion(quake)
-    drawn, building = draw_plants(plants + held_out_plants, seed), find_case(case)
+    tunable, building, ground = _find_tunable(name), find_case(case), ground_motion(quake)
+    drawn = draw_plants(plants + held_out_plants, seed)
     tuning = _TestSeries(building, ground[: round(TUNED_SECONDS / PERIOD)], drawn[:plants])
     validation = _TestSeries(building, ground, drawn[plants:])
 
@@ -279,12 +279,11 @@ def tune_compensator(
         return tuning.criterion(tunable.make(**tunable.values(point)))
 
     (start, first), (best, last) = _improve(objective, tunable.start(), evaluations)
-    initial, tuned = tunable.values(start), tunable.values(best)
-    before, after = tunable.make(**initial), tunable.make(**tuned)
+    values = tunable.values(start), tunable.values(best)
+    before, after = (tunable.make(**parameters) for parameters in values)
     return TunedCompensator(
-        name=name,
-        before=initial,
-        after=tuned,
+        name,
+        *values,
         criterion=(first, last),
         judged=(validation.worst_tracking(before), validation.worst_tracking(after)),
         noisy=(validation.noise_response(before), validation.noise_response(after)),

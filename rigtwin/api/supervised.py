@@ -148,12 +148,16 @@ def dry_run(
     )
     with _stopped_by(stop, stop_file) as asked:
         ended = record_unpaced(open_virtual_card(test)[0], test, Path(path), asked, progress)
+    if ended.cause == COMPLETED and not test.effects:
+        _note_dry_run(test, Path(card))
+    return _judge_dry_run(test, Path(path), ended)
+
+
+def _judge_dry_run(test: AnyTest, path: Path, ended: SessionEnd) -> DryRun:
     # A session that ended before its test has no ticks, and cannot be loaded.
-    recording = load(Path(path)) if ended.ticks else None
+    recording = load(path) if ended.ticks else None
     peaks = test.predict_peaks(recording) if recording is not None else ()
     passed = ended.cause == COMPLETED
-    if passed and not test.effects:
-        _note_dry_run(test, Path(card))
     return DryRun(recording, ended.cause.reason, passed, peaks, list_obstacles(test))
 
 

@@ -30,6 +30,7 @@ from rigtwin.diagnosis.finding import (
     Interval,
     NextTest,
     Place,
+    Tolerated,
     Verdict,
 )
 from rigtwin.diagnosis.findings import (
@@ -269,10 +270,7 @@ def _diagnose_part(
         ),
         next_test=next_test,
         not_observable=list_unobservable(explanation, attributed),
-        notes=(
-            *_collect_notes(evidence, judged, readings, thresholds),
-            *describe_used_up(tolerated),
-        ),
+        notes=tuple(_collect_notes(evidence, judged, readings, tolerated, thresholds)),
         recordings=tuple(str(recording.path) for recording in evidence.recordings),
         seconds=time.perf_counter() - started,
         machine=evidence.machine.name,
@@ -353,7 +351,11 @@ def _choose_verdict(
 
 
 def _collect_notes(
-    evidence: Evidence, judged: _Judged, readings: SignalReadings, thresholds: Thresholds
+    evidence: Evidence,
+    judged: _Judged,
+    readings: SignalReadings,
+    tolerated: Sequence[Tolerated],
+    thresholds: Thresholds,
 ) -> list[str]:
     cut = (
         f"the search ended after about {thresholds.effort:.0f} s of processor time, before all "
@@ -370,6 +372,7 @@ def _collect_notes(
         *judged.notes,
         *describe_unused(evidence, judged.plant),
         *map(describe_negligible, readings.negligible),
+        *describe_used_up(tolerated),
     ]
 
 

@@ -240,12 +240,23 @@ def sentence(
         place = where[0] if where else None
         at = f" at the {name_part(place.component)}; {place.evidence}" if place else ""
         return f"Unmodelled effect{at}."
+    text = _list_effects(effects) + _say_closed(effects, gap)
+    if verdict == "partly explained":
+        text += (
+            "; the remaining gap lies within the declared tolerances"
+            if is_tolerated
+            else "; an unmodelled residual remains"
+        )
+    return f"{text[0].upper()}{text[1:]}."
+
+
+def _list_effects(effects: Sequence[Finding]) -> str:
+    """List the largest effects, in one clause for each component, and count the others."""
     shown = list(effects)
     more = ""
     if len(effects) > MOST_EFFECTS:
         shown = sorted(effects, key=lambda effect: -effect.share)[:MOST_EFFECTS]
         more = f"; and {len(effects) - MOST_EFFECTS} more effects that are smaller"
-    # One clause for each component, however many effects it has.
     parts: dict[str, list[str]] = {}
     for effect in shown:
         parts.setdefault(effect.name.component, []).append(_describe_effect(effect))
@@ -253,19 +264,15 @@ def sentence(
         f"{_with_article(component)} has {enumerate_words(descriptions)}"
         for component, descriptions in parts.items()
     )
-    closed = ""
-    if gap.before > GAP_TO_CLOSE and any(effect.name.kind not in STATIC for effect in effects):
-        closed = (
-            f"; the correction closes {100 * gap.shrinkage_held_out.value:.0f} "
-            "% of the gap on data held out of the fit"
-        )
-    residual = ""
-    if verdict == "partly explained":
-        residual = "; an unmodelled residual remains"
-        if is_tolerated:
-            residual = "; the remaining gap lies within the declared tolerances"
-    text = listed + more + closed + residual + "."
-    return text[0].upper() + text[1:]
+    return listed + more
+
+
+def _say_closed(effects: Sequence[Finding], gap: Gap) -> str:
+    """Say which share of the gap is closed, in a clause; empty without a gap to close."""
+    if gap.before <= GAP_TO_CLOSE or all(effect.name.kind in STATIC for effect in effects):
+        return ""
+    closed = 100 * gap.shrinkage_held_out.value
+    return f"; the correction closes {closed:.0f} % of the gap on data held out of the fit"
 
 
 def _with_article(component: str) -> str:
