@@ -19,7 +19,7 @@ import numpy as np
 
 import rigtwin
 from rigtwin.numerics.arrays import Array
-from rigtwin.recording import Recording
+from rigtwin.recording import RecordedTest
 
 PERIOD = 1e-3
 LENGTHS, MASSES = (0.0, 0.4, 0.35, 0.1, 0.1, 0.08), (6.0, 5.0, 3.5, 1.5, 1.0, 0.6)
@@ -107,7 +107,7 @@ def move(joints: int, seconds: float) -> tuple[Array, Array, Array]:
     )
 
 
-def record(joints: int, seconds: float) -> Recording:
+def record(joints: int, seconds: float) -> RecordedTest:
     """Record a test of the loaded arm."""
     model = mujoco.MjModel.from_xml_string(write_mjcf(joints, loaded=True))
     data, travel = mujoco.MjData(model), move(joints, seconds)
@@ -127,7 +127,7 @@ def record(joints: int, seconds: float) -> Recording:
         sensors[f"angle_{joint}"] = travel[0][joint] + ANGLE_NOISE * noise[0]
         sensors[f"torque_{joint}"] = motor_torque + TORQUE_NOISE * np.std(motor_torque) * noise[1]
     ticks = np.arange(torque.shape[1]) * PERIOD
-    return Recording(Path("arm"), "arm", "", PERIOD, ticks, {"/sensor": sensors}, {})
+    return RecordedTest(Path("arm"), "arm", "", PERIOD, ticks, {"/sensor": sensors}, {})
 
 
 def main() -> None:

@@ -16,18 +16,20 @@ from tqdm import tqdm
 from referee.bench_cases import BenchCase, draw_case, record
 from rigtwin.description.catalogue import find
 from rigtwin.diagnosis.diagnose import diagnose
-from rigtwin.recording import Recording
+from rigtwin.recording import RecordedTest
 
 
-def recording_of(case: BenchCase, again: int = 0) -> Recording:
+def recording_of(case: BenchCase, again: int = 0) -> RecordedTest:
     """Return the recording of a case; again: number of the repetition."""
     data = record(case, again)
     time = np.arange(len(data.first)) * case.period
     if case.machine == "actuator":
         columns = {"/command": {"position": data.first}, "/sensor": {"position": data.second}}
-        return Recording(Path("actuator"), "position-actuator", "", case.period, time, columns, {})
+        return RecordedTest(
+            Path("actuator"), "position-actuator", "", case.period, time, columns, {}
+        )
     columns = {"/sensor": {"displacement": data.first, "force": data.second}}
-    return Recording(Path("damper"), "damper-bench", "", case.period, time, columns, {})
+    return RecordedTest(Path("damper"), "damper-bench", "", case.period, time, columns, {})
 
 
 def diagnose_case(

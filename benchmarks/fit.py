@@ -47,7 +47,7 @@ from rigtwin.diagnosis.evidence import Evidence, relative_errors
 from rigtwin.diagnosis.fit import with_values
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
-from rigtwin.recording import Recording
+from rigtwin.recording import RecordedTest
 
 GOALS = {"emps": 0.2, "free": 0.5, "moved": 0.1}
 """Largest ratio of the times that is aimed at."""
@@ -127,19 +127,21 @@ class Contest:
     name: str
     title: str
     machine: rigtwin.Machine
-    fitted: Recording
-    held_out: Recording
+    fitted: RecordedTest
+    held_out: RecordedTest
     parameters: tuple[ToolboxParameter, ...]
     residual: Residual
     residual_held_out: Residual
     truth: Mapping[str, float] = field(default_factory=dict)
 
 
-def _recording(machine: rigtwin.Machine, columns: Mapping[str, Mapping[str, Array]]) -> Recording:
+def _recording(
+    machine: rigtwin.Machine, columns: Mapping[str, Mapping[str, Array]]
+) -> RecordedTest:
     ticks = len(next(iter(next(iter(columns.values())).values())))
     times = np.arange(ticks) * TICK
     tables = {topic: dict(fields) for topic, fields in columns.items()}
-    return Recording(Path("test"), machine.name, "", TICK, times, tables, {})
+    return RecordedTest(Path("test"), machine.name, "", TICK, times, tables, {})
 
 
 def friction_parameters(
@@ -179,7 +181,7 @@ def pose_moved() -> Contest:
     spec = mujoco.MjSpec.from_file(str(Path(MACHINES["arm_2"]).with_suffix(".xml")))
     harden_friction(spec)
 
-    def pose(recording: Recording) -> Residual:
+    def pose(recording: RecordedTest) -> Residual:
         sensors = recording.columns["/sensor"]
         positions, forces = (
             np.stack([sensors[f"{word}_{number}"] for number in (1, 2)])

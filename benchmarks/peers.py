@@ -48,7 +48,7 @@ from referee.arm_cases import MACHINES, PERIOD, ArmCase, draw_arm, record_arm
 from rigtwin.components import Body, Guide, Rotor
 from rigtwin.diagnosis.evidence import Evidence, relative_errors
 from rigtwin.numerics.arrays import Array
-from rigtwin.recording import Recording
+from rigtwin.recording import RecordedTest
 from rigtwin.signals.band import limit_band
 
 BAND, EVERY = 25.0, 5
@@ -79,10 +79,10 @@ class Problem:
 
     case: ArmCase
     machine: rigtwin.Machine
-    fitted: Recording
-    held_out: Recording
+    fitted: RecordedTest
+    held_out: RecordedTest
 
-    def test(self, recording: Recording) -> InverseTest:
+    def test(self, recording: RecordedTest) -> InverseTest:
         """Return filtered motion and forces of a recording, for the peers."""
         replay = self.machine.replays[0]
         channels = {
@@ -134,11 +134,11 @@ def draw_problems(count: int, seed: int) -> Iterator[Problem]:
             ticks = len(next(iter(columns["/sensor"].values())))
             label = Path(f"{number}-{again}")
             times = PERIOD * np.arange(ticks)
-            recordings.append(Recording(label, machine.name, "", PERIOD, times, columns, {}))
+            recordings.append(RecordedTest(label, machine.name, "", PERIOD, times, columns, {}))
         yield Problem(case, machine, *recordings)
 
 
-def evidence_of(problem: Problem, recording: Recording) -> Evidence:
+def evidence_of(problem: Problem, recording: RecordedTest) -> Evidence:
     """Return the whitened evidence of one recording about the nominal machine."""
     configuration = problem.machine.configuration_of(recording, None)
     return Evidence(problem.machine, [recording], [configuration])
@@ -260,7 +260,7 @@ def list_candidates(
         yield single(f"offset@{name}", 0.0, -0.2, 0.2, None)
 
 
-def pose(problem: Problem, spec: mujoco.MjSpec, recording: Recording) -> InverseProblem:
+def pose(problem: Problem, spec: mujoco.MjSpec, recording: RecordedTest) -> InverseProblem:
     """Return the toolbox's residual of one recording, with gains and zeros of the sensors."""
     replay = problem.machine.replays[0]
     test = problem.test(recording)
@@ -362,7 +362,7 @@ class Residuals:
         return (self.measured - self.nominal)[:, self.compared]
 
 
-def residuals_of(problem: Problem, recording: Recording) -> Residuals:
+def residuals_of(problem: Problem, recording: RecordedTest) -> Residuals:
     """Return the residual torques of a recording."""
     evidence, test = evidence_of(problem, recording), problem.test(recording)
     compared = slice(test.compared.start, test.compared.stop, EVERY)

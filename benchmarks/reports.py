@@ -20,7 +20,7 @@ from PIL import Image
 import rigtwin
 from benchmarks.real_machines import judge
 from rigtwin.description.catalogue import SHIPPED
-from rigtwin.recording import Recording
+from rigtwin.recording import RecordedTest
 from tests.helpers.browser import looked_at
 from tests.helpers.recordings import replace_sensors
 
@@ -30,20 +30,20 @@ COLUMNS = 4
 """Columns of the sheet."""
 
 
-def recorded(**effects: float) -> Recording:
+def recorded(**effects: float) -> RecordedTest:
     """Record 30 s of the suspension rig with some effects, named `kind_at_component`."""
     named = {name.replace("_at_", "@"): value for name, value in effects.items()}
     settings = {"timing": {"duration": 30.0}}
     return rigtwin.run("suspension-rig", "imposed", seed=4, settings=settings, effects=named)
 
 
-def drifting() -> Recording:
+def drifting() -> RecordedTest:
     """Return a recording with a drifting load cell, an effect without a name in the library."""
     sound = recorded()
     return replace_sensors(sound, load_cell=sound["/sensor.load_cell"] + 4.0 * sound.time)
 
 
-def in_millimetres() -> Recording:
+def in_millimetres() -> RecordedTest:
     """Return a recording with one channel in the wrong unit."""
     sound = recorded()
     return replace_sensors(sound, suspension_lvdt=1e3 * sound["/sensor.suspension_lvdt"])
@@ -57,7 +57,7 @@ def arm(folder: Path) -> rigtwin.Diagnosis:
         return rigtwin.diagnose(made)
 
 
-RIG: dict[str, Callable[[], Recording]] = {
+RIG: dict[str, Callable[[], RecordedTest]] = {
     "one-effect": lambda: recorded(viscous_at_motor=50.0),
     "pair": lambda: recorded(viscous_at_motor=50.0, coulomb_at_rail=75.0),
     "unknown": drifting,

@@ -88,15 +88,15 @@ def answer_question(question: Question) -> dict[str, Any]:
     """
     from rigtwin.description.catalogue import find
     from rigtwin.diagnosis.diagnose import diagnose
-    from rigtwin.recording import Recording
+    from rigtwin.recording import RecordedTest
 
     name, tests = question
     machine = find(name)
 
-    def load(data: WildData, label: str) -> Recording:
+    def load(data: WildData, label: str) -> RecordedTest:
         ticks = len(next(iter(next(iter(data.columns.values())).values())))
         times = np.arange(ticks) * data.period
-        return Recording(Path(label), machine.name, "", data.period, times, data.columns, {})
+        return RecordedTest(Path(label), machine.name, "", data.period, times, data.columns, {})
 
     start = time.perf_counter()
     fitted, held_out = (load(data, label) for data, label in zip(tests, "ab", strict=True))

@@ -16,7 +16,7 @@ from rigtwin.files import atomic_write, require_path
 
 if TYPE_CHECKING:
     from rigtwin.description.configuration import Configuration
-    from rigtwin.recording import Recording
+    from rigtwin.recording import RecordedTest
 
 
 def configured(configuration: Configuration, parsed: Namespace) -> Configuration:
@@ -48,7 +48,7 @@ def writable(out: Path) -> None:
         raise RigtwinError(f"cannot write {out}: permission denied")
 
 
-def tell_notes(recording: Recording) -> None:
+def tell_notes(recording: RecordedTest) -> None:
     """Print the notes of a recording on standard error."""
     for note in recording.notes:
         print(f"note: {recording.path}: {note}", file=sys.stderr)

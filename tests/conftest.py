@@ -6,7 +6,7 @@ import signal
 
 import pytest
 
-from rigtwin.recording import Recording
+from rigtwin.recording import RecordedTest
 from tests.helpers.recordings import EXAMPLE, beginning, shipped
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
@@ -15,6 +15,6 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 
 
 @pytest.fixture(scope="session")
-def example() -> Recording:
+def example() -> RecordedTest:
     """8 s of a rig without defects, which is not the twin."""
     return beginning(shipped(EXAMPLE.stem), 8.0)

@@ -32,7 +32,7 @@ from referee.arm_truth import (
 )
 from rigtwin.description.catalogue import find
 from rigtwin.diagnosis.data_checks import find_faults
-from rigtwin.recording import Recording
+from rigtwin.recording import RecordedTest
 from tests.helpers import arm
 
 SMOOTH = np.random.default_rng(3)
@@ -113,7 +113,7 @@ def test_recordings_are_usable_and_acceptable_names_exist(tmp_path, number):
     machine = find(MACHINES[case.machine])
     test = record_arm(case)
     ticks = len(next(iter(test.columns["/sensor"].values())))
-    record = Recording(
+    record = RecordedTest(
         tmp_path, machine.name, "", test.period, np.arange(ticks) * test.period, test.columns, {}
     )
     faults = find_faults(machine, record, machine.configuration_of(record))

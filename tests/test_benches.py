@@ -22,7 +22,7 @@ from rigtwin.diagnosis.diagnose import diagnose
 from rigtwin.diagnosis.localisation import distance_since_reversal
 from rigtwin.diagnosis.result import Diagnosis
 from rigtwin.importing.convert import convert
-from rigtwin.recording import Recording, load
+from rigtwin.recording import RecordedTest, load
 from tests.helpers.benches import recording_of
 
 EMPS = Path(__file__).parents[2] / "shared" / "real" / "emps"
@@ -94,7 +94,7 @@ def test_a_slow_logger_and_a_stepping_command():
     time = np.arange(len(command)) * period
     columns = {"/command": {"position": command}, "/sensor": {"position": position}}
     machine = find("position-actuator")
-    recording = Recording(Path("slow"), machine.name, "", period, time, columns, {})
+    recording = RecordedTest(Path("slow"), machine.name, "", period, time, columns, {})
     found = diagnose(machine, [recording])
     values = {str(effect.name): next(iter(effect.parameters.values())) for effect in found.effects}
     assert set(values) == {"lag@actuator", "delay@actuator", "rate_limit@actuator"}

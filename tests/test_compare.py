@@ -20,7 +20,7 @@ from rigtwin.description.effects import apply_effects
 from rigtwin.description.settings import Timing
 from rigtwin.diagnosis.compare import compare, compare_recordings, differences
 from rigtwin.errors import RigtwinError
-from rigtwin.recording import Recording, load
+from rigtwin.recording import RecordedTest, load
 from rigtwin.rig.component_replays import REPLAYS, ComponentReplays, Undetermined
 from rigtwin.rig.simulated import simulate_recording
 from rigtwin.simulation.runner import record
@@ -39,7 +39,7 @@ LIMITS = {
 COMPONENTS = tuple(LIMITS)
 
 
-def ratios(recording: Recording) -> dict[str, float]:
+def ratios(recording: RecordedTest) -> dict[str, float]:
     return {name: result.ratio for name, result in compare(RIG, recording).replays.items()}
 
 
@@ -147,7 +147,7 @@ def test_a_fault_of_the_twin_stands_out_where_it_is(fault):
     assert all(result.ratio < 1.2 for result in compare(RIG, recording, known).replays.values())
 
 
-def without(recording: Recording, topic: str, name: str) -> Recording:
+def without(recording: RecordedTest, topic: str, name: str) -> RecordedTest:
     columns = {
         t: {n: v for n, v in fields.items() if (t, n) != (topic, name)}
         for t, fields in recording.columns.items()

@@ -14,7 +14,7 @@ from rigtwin.description.settings import Timing
 from rigtwin.diagnosis.data_checks import Fault, find_faults
 from rigtwin.diagnosis.diagnose import diagnose
 from rigtwin.numerics.arrays import Array
-from rigtwin.recording import Recording, load
+from rigtwin.recording import RecordedTest, load
 from rigtwin.simulation.runner import record
 from tests.helpers.effects import once_a_sort, text
 from tests.helpers.recordings import BESIDE, SHIPPED, beside, replace_sensors, shipped
@@ -22,7 +22,7 @@ from tests.helpers.twin import RIG
 
 
 @pytest.fixture(scope="module")
-def recordings(tmp_path_factory) -> dict[str, Recording]:
+def recordings(tmp_path_factory) -> dict[str, RecordedTest]:
     folder, found = tmp_path_factory.mktemp("checks"), {}
     for name in ("drop", "imposed", "road10", "single-mass", "semi-active"):
         experiment = EXPERIMENTS[name]
@@ -34,11 +34,11 @@ def recordings(tmp_path_factory) -> dict[str, Recording]:
     return found
 
 
-def check(recording: Recording) -> tuple[Fault, ...]:
+def check(recording: RecordedTest) -> tuple[Fault, ...]:
     return find_faults(RIG, recording, RIG.configuration_of(recording))
 
 
-def faults(recording: Recording) -> dict[str, str]:
+def faults(recording: RecordedTest) -> dict[str, str]:
     """where → kind."""
     return {fault.where: fault.kind for fault in check(recording)}
 
@@ -157,7 +157,7 @@ def test_a_recording_of_another_machine_is_called_that_whatever_settings_it_hold
     assert "it is of machine 'suspension-rig'; this twin is 'emps'" in found.sentence
 
 
-def turn(recording: Recording) -> Recording:
+def turn(recording: RecordedTest) -> RecordedTest:
     """The recording as if its time had run backwards."""
     columns = {
         topic: {name: values[::-1].copy() for name, values in fields.items()}
@@ -166,7 +166,7 @@ def turn(recording: Recording) -> Recording:
     return dataclasses.replace(recording, columns=columns)
 
 
-def replace_commands(recording: Recording, **commands: Array) -> Recording:
+def replace_commands(recording: RecordedTest, **commands: Array) -> RecordedTest:
     columns = {**recording.columns["/command"], **commands}
     return dataclasses.replace(recording, columns={**recording.columns, "/command": columns})
 

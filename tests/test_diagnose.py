@@ -25,7 +25,7 @@ from rigtwin.diagnosis.sampling import find_outstanding
 from rigtwin.diagnosis.shrinkage import Blocks, interval, shrinkage
 from rigtwin.diagnosis.unknown_input import locate_disturbance
 from rigtwin.errors import RigtwinError
-from rigtwin.recording import Recording
+from rigtwin.recording import RecordedTest
 from tests.helpers.recordings import SHIPPED, beginning, beside, replace_sensors, shipped
 from tests.helpers.twin import RIG, answer, evidence_of, recorded, rig_effect
 
@@ -177,7 +177,7 @@ def test_a_free_disturbance_finds_the_component_without_the_library(effect):
     assert locate_disturbance(evidence, evidence.plant)[0].component == name
 
 
-def drifting(recording: Recording, rate: float) -> Recording:
+def drifting(recording: RecordedTest, rate: float) -> RecordedTest:
     """Its suspension LVDT's zero moving, m/s."""
     moved = recording["/sensor.suspension_lvdt"] + rate * recording.time
     return replace_sensors(recording, suspension_lvdt=moved)
@@ -195,7 +195,7 @@ def test_a_free_disturbance_is_judged_beside_the_tolerances_that_the_plant_uses(
     assert locate_disturbance(nominal, nominal.plant)[0].gained < 0.01 * nominal.expected
 
 
-def deviation_of(recording: Recording) -> Deviation | None:
+def deviation_of(recording: RecordedTest) -> Deviation | None:
     assert RIG.control is not None
     settings = RIG.configuration_of(recording).controller
     return ControllerReplay(RIG.control, recording, settings).deviation()
@@ -374,7 +374,7 @@ def test_the_fast_multisine_tells_a_delay_from_a_lag():
     assert found.command.startswith("rigtwin run imposed-fast")
 
 
-def spoilt(change: str) -> Recording:
+def spoilt(change: str) -> RecordedTest:
     recording = recorded("imposed")
     sensors = dict(recording.columns["/sensor"])
     machine, time = recording.machine, recording.time

@@ -11,7 +11,7 @@ import rigtwin
 from rigtwin.components import ForceSensor, PositionSensor, VelocitySensor
 from rigtwin.components.sensors import apply_sensor
 from rigtwin.models.measured_motion import recover_motion
-from rigtwin.recording import Recording
+from rigtwin.recording import RecordedTest
 
 PERIOD = 2e-3
 TIME = np.arange(10_000) * PERIOD
@@ -26,7 +26,7 @@ def test_the_zero_moves_evenly(sensor):
     assert recover_motion(made, read, PERIOD) == pytest.approx(WAVE, abs=1e-9)
 
 
-def bench(drift: float, coulomb: float) -> Recording:
+def bench(drift: float, coulomb: float) -> RecordedTest:
     """A damper of 900 Ns/m and dry friction, whose load cell drifts."""
     random = np.random.default_rng(8)
     speed = np.gradient(WAVE, PERIOD)
@@ -37,7 +37,7 @@ def bench(drift: float, coulomb: float) -> Recording:
             "force": force + 0.5 * random.standard_normal(TIME.size),
         }
     }
-    return Recording(Path("bench"), "damper-bench", "", PERIOD, TIME, columns, {})
+    return RecordedTest(Path("bench"), "damper-bench", "", PERIOD, TIME, columns, {})
 
 
 @pytest.mark.slow

@@ -14,7 +14,7 @@ import rigtwin
 from controllers import Mode, Settings, Travel
 from rigtwin.description.changes import with_changes
 from rigtwin.description.configuration import Configuration
-from rigtwin.recording import Recording
+from rigtwin.recording import RecordedTest
 from rigtwin.simulation.energy import measure_energy
 from rigtwin.simulation.loop import RigController
 
@@ -27,7 +27,7 @@ def posed(wanted: np.ndarray, plate: np.ndarray, travel: np.ndarray, force: np.n
     commands = {"structure": wanted, "ground": 0.0 * wanted, "force": force, "voltage": force}
     sensed = {"structure_lvdt": plate, "suspension_lvdt": travel, "load_cell": force}
     times = np.arange(len(wanted)) * PERIOD
-    return Recording(
+    return RecordedTest(
         path=Path("posed"),
         machine="suspension-rig",
         experiment="",

@@ -15,7 +15,7 @@ from rigtwin.description.catalogue import find
 from rigtwin.description.machine import Machine
 from rigtwin.diagnosis.diagnose import diagnose
 from rigtwin.diagnosis.result import Diagnosis
-from rigtwin.recording import Recording, load
+from rigtwin.recording import RecordedTest, load
 from tests.helpers.recordings import BESIDE
 from tests.helpers.twin import recorded
 
@@ -25,7 +25,7 @@ CROPPED = 10
 """Ticks that are taken off either end."""
 JOINTS = BESIDE.parent / "joints"
 
-Recordings = Sequence[Recording]
+Recordings = Sequence[RecordedTest]
 Change = Callable[[Recordings], Recordings]
 
 
@@ -91,11 +91,11 @@ CHANGES: dict[str, Change] = {
 }
 
 
-def recording_of(data: WildData, machine: str) -> Recording:
+def recording_of(data: WildData, machine: str) -> RecordedTest:
     """The recording of a referee's case."""
     ticks = len(next(iter(next(iter(data.columns.values())).values())))
     time = np.arange(ticks) * data.period
-    return Recording(Path("case"), machine, "", data.period, time, data.columns, {})
+    return RecordedTest(Path("case"), machine, "", data.period, time, data.columns, {})
 
 
 def bring_rig() -> tuple[Machine, Recordings]:

@@ -17,7 +17,7 @@ from rigtwin.models.following import follow_command
 from rigtwin.models.joint import JointModel
 from rigtwin.models.joint_inverse import inverse_dynamics
 from rigtwin.models.joint_motion import Inertia
-from rigtwin.recording import Recording
+from rigtwin.recording import RecordedTest
 from rigtwin.signals.noise import smooth
 from tests.helpers.described import described, recording_of
 
@@ -131,7 +131,7 @@ def test_a_mass_on_a_stuck_guide_oscillates_on_its_mount(tmp_path):
     """ω² = 1/(c·m), without numerical damping."""
     machine = described(tmp_path, "slide")
     pushed = {"/command": {"force": np.full(3000, 5.0)}, "/sensor": {"position": np.zeros(3000)}}
-    recording = Recording(Path("bench"), machine.name, "", PERIOD, TIME, pushed, {})
+    recording = RecordedTest(Path("bench"), machine.name, "", PERIOD, TIME, pushed, {})
     model = JointModel(
         machine, machine.replays[0], recording.inputs, machine.configuration_of(recording), 4
     )
@@ -245,7 +245,7 @@ def test_a_loop_is_closed_by_the_controllers_formula():
         },
         "/sensor": {"position": reference},
     }
-    recording = Recording(Path("emps"), "emps", "", PERIOD, TIME, columns, {})
+    recording = RecordedTest(Path("emps"), "emps", "", PERIOD, TIME, columns, {})
     model = machine.physics.model(machine, recording.inputs, machine.configuration, 8)
     force = model.predict(machine.plant)[0]
     speed = np.gradient(reference, PERIOD)

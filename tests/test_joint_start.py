@@ -9,7 +9,7 @@ import pytest
 
 import rigtwin
 from rigtwin.components import with_parameters
-from rigtwin.recording import Recording
+from rigtwin.recording import RecordedTest
 from tests.helpers.coupled import ARM, arm, described, integrate, recording
 from tests.helpers.reference import swing_dry
 
@@ -35,12 +35,12 @@ PERIOD, SECONDS = 5e-3, 20.0
 MASS, LEVER, COULOMB, ZERO = 2.5, 0.4, 0.02, 1.2
 
 
-def swung(start: tuple[float, float], zero: float, coulomb: float) -> Recording:
+def swung(start: tuple[float, float], zero: float, coulomb: float) -> RecordedTest:
     _, rate, _ = swing_dry(MASS, LEVER, coulomb, start, np.arange(0.0, SECONDS, PERIOD))
     rate = rate + zero + 2e-3 * np.random.default_rng(4).standard_normal(rate.size)
     columns = {"/command": {"push": np.zeros(rate.size)}, "/sensor": {"rate": rate}}
     time = np.arange(rate.size) * PERIOD
-    return Recording(Path("swing"), "fork", "", PERIOD, time, columns, {})
+    return RecordedTest(Path("swing"), "fork", "", PERIOD, time, columns, {})
 
 
 @pytest.mark.parametrize("start", [(0.3, 0.0), (0.05, -1.2), (-1.0, 0.5)])
@@ -104,7 +104,7 @@ observe = ["encoder"]
 """
 
 
-def pushed_cart() -> Recording:
+def pushed_cart() -> RecordedTest:
     """Cart under a held force, m·x'' = F − d·x' solved exactly from tick to tick, with noise."""
     mass, damping = 2.0, 0.5
     time = np.arange(0.0, 8.0, PERIOD)
@@ -120,7 +120,7 @@ def pushed_cart() -> Recording:
         )
     place = place + 1e-4 * np.random.default_rng(6).standard_normal(time.size)
     columns = {"/command": {"push": force}, "/sensor": {"place": place}}
-    return Recording(Path("push"), "cart", "", PERIOD, time, columns, {})
+    return RecordedTest(Path("push"), "cart", "", PERIOD, time, columns, {})
 
 
 @pytest.mark.parametrize(("viscous", "apart"), [(0.5, 2e-5), (0.51, 5e-4)])

@@ -11,7 +11,7 @@ from rigtwin.components import Effect, candidates, with_parameters
 from rigtwin.description.machine import Machine
 from rigtwin.models.joint import JointModel
 from rigtwin.numerics.arrays import Array
-from rigtwin.recording import Recording
+from rigtwin.recording import RecordedTest
 from tests.helpers.described import TOML, described
 from tests.helpers.mujoco_joint import MujocoModel
 
@@ -60,7 +60,7 @@ SHAPES = {"end_stops": {"stop_damping": 5.0, "stop_low": -0.03, "stop_high": 0.0
 
 
 def models(machine: Machine, column: dict[str, dict[str, Array]]) -> tuple[JointModel, MujocoModel]:
-    recording = Recording(Path("bench"), machine.name, "", PERIOD, TIME, column, {})
+    recording = RecordedTest(Path("bench"), machine.name, "", PERIOD, TIME, column, {})
     configuration = machine.configuration_of(recording)
     replay = machine.replays[0]
     return (

@@ -11,7 +11,7 @@ import pytest
 import rigtwin
 from rigtwin.cli import main
 from rigtwin.description.catalogue import find
-from rigtwin.recording import Recording, load
+from rigtwin.recording import RecordedTest, load
 from rigtwin.studies.tuning.measures import Trial
 from rigtwin.studies.tuning.own_measures import STATISTICS, list_channels, parse_measure
 from rigtwin.studies.tuning.study_file import parse_study
@@ -117,7 +117,7 @@ def test_a_rig_s_measures_are_not_another_machine_s() -> None:
 SETTINGS = {"timing": {"duration": 2.0, "timestep": 1e-3}, "guide": {"coulomb": 20.0}}
 
 
-def error(recording: Recording) -> np.ndarray:
+def error(recording: RecordedTest) -> np.ndarray:
     off = recording.column("/command", "reference") - recording.column("/sensor", "position")
     return off[500:]
 

@@ -14,7 +14,7 @@ from rigtwin.diagnosis.balance import balance_forces
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.fitter import Fitter
 from rigtwin.numerics.arrays import Array
-from rigtwin.recording import Recording
+from rigtwin.recording import RecordedTest
 from tests.helpers.coupled import described
 from tests.helpers.reference import swing_dry
 
@@ -40,13 +40,13 @@ PERIOD = 5e-3
 MASS, LEVER, COULOMB, VISCOUS = 2.5, 0.4, 0.35, 0.12
 
 
-def pushed(seconds: float = 10.0) -> Recording:
+def pushed(seconds: float = 10.0) -> RecordedTest:
     """Swung up by a torque that follows its speed, so that it goes round several times."""
     time = np.arange(0.0, seconds, PERIOD)
     swung = swing_dry(MASS, LEVER, COULOMB, (0.0, 0.1), time, VISCOUS, push)
     angle = swung[0] + 1e-4 * np.random.default_rng(2).standard_normal(time.size)
     columns = {"/command": {"torque": swung[2]}, "/sensor": {"position": angle}}
-    return Recording(Path("pushed"), "arm", "", PERIOD, time, columns, {})
+    return RecordedTest(Path("pushed"), "arm", "", PERIOD, time, columns, {})
 
 
 def push(time: float, angle: float, rate: float) -> float:
@@ -96,7 +96,7 @@ def test_what_is_prescribed_misses_no_force() -> None:
     time = np.arange(1000) * 1e-3
     wave = 0.01 * np.sin(6.0 * time)
     columns: dict[str, dict[str, Array]] = {"/sensor": {"displacement": wave, "force": wave}}
-    seen = Recording(Path("bench"), machine.name, "", 1e-3, time, columns, {})
+    seen = RecordedTest(Path("bench"), machine.name, "", 1e-3, time, columns, {})
     assert (
         machine.physics.model(
             machine, seen.inputs, machine.configuration_of(seen), 1

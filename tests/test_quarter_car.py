@@ -15,7 +15,7 @@ from rigtwin.diagnosis.spikes import despike
 from rigtwin.diagnosis.swing import swings
 from rigtwin.models.quarter_car import Disturbances, QuarterCarModel
 from rigtwin.models.quarter_car_step import motor_friction, solve_velocity
-from rigtwin.recording import Recording
+from rigtwin.recording import RecordedTest
 from rigtwin.simulation.loop import run_compiled
 from rigtwin.simulation.plant import initial_yield
 from rigtwin.simulation.twin import Twin
@@ -54,7 +54,7 @@ def apart(configuration: Configuration, name: str = "imposed") -> tuple[float, f
     return float(max(rms[:3])), float(rms[3])
 
 
-def reduced_of(recording: Recording) -> QuarterCarModel:
+def reduced_of(recording: RecordedTest) -> QuarterCarModel:
     ground, structure, voltage = (
         recording.column("/command", name) for name in ("ground", "structure", "voltage")
     )

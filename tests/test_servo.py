@@ -20,7 +20,7 @@ from rigtwin.diagnosis.prices import Prices
 from rigtwin.diagnosis.thresholds import STANDARD
 from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
-from rigtwin.recording import Recording
+from rigtwin.recording import RecordedTest
 from tests.helpers.mujoco_joint import MujocoModel
 
 ARM = """
@@ -115,7 +115,7 @@ def commanded(time: Array) -> dict[str, Array]:
     }
 
 
-def recorded(text: str, noise: float = 1e-4, seed: int = 5) -> Recording:
+def recorded(text: str, noise: float = 1e-4, seed: int = 5) -> RecordedTest:
     """What MuJoCo's own actuators do."""
     model = mujoco.MjModel.from_xml_string(text)
     data, joints = mujoco.MjData(model), ("shoulder", "elbow")[: model.nu]
@@ -130,7 +130,7 @@ def recorded(text: str, noise: float = 1e-4, seed: int = 5) -> Recording:
     random = np.random.default_rng(seed)
     places += noise * random.standard_normal(places.shape)
     sensors = dict(zip(joints, places, strict=True))
-    return Recording(
+    return RecordedTest(
         path=Path("arm.mcap"),
         machine="servo-arm",
         experiment="steps and sines",
@@ -141,7 +141,7 @@ def recorded(text: str, noise: float = 1e-4, seed: int = 5) -> Recording:
     )
 
 
-def predict(machine: rigtwin.Machine, recording: Recording) -> dict[str, Array]:
+def predict(machine: rigtwin.Machine, recording: RecordedTest) -> dict[str, Array]:
     configuration = machine.configuration_of(recording)
     model = machine.physics.model(machine, recording.inputs, configuration, 16)
     rows = model.predict(machine.plant)
@@ -276,7 +276,7 @@ def test_delay_and_time_constant_of_the_mjcf_act_as_in_mujoco(tmp_path: Path) ->
             mujoco.mj_step(model, data)
     columns = {"/command": {"shoulder": command}, "/sensor": {"shoulder": angle}}
     time = np.arange(2000) * 1e-3
-    recording = Recording(Path("servo"), machine.name, "", 1e-3, time, columns, {})
+    recording = RecordedTest(Path("servo"), machine.name, "", 1e-3, time, columns, {})
     configuration = machine.configuration_of(recording)
     predicted = machine.physics.model(machine, recording.inputs, configuration, 8).predict(
         machine.plant

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import rigtwin
-from rigtwin.recording import Recording
+from rigtwin.recording import RecordedTest
 
 MODEL = """
 <mujoco>
@@ -48,7 +48,7 @@ def through(command: float, forward: float, backward: float) -> float:
     return max(command - forward, 0.0) + min(command + backward, 0.0)
 
 
-def recorded(forward: float, backward: float, seed: int) -> Recording:
+def recorded(forward: float, backward: float, seed: int) -> RecordedTest:
     model = mujoco.MjModel.from_xml_string(MODEL)
     data, random = mujoco.MjData(model), np.random.default_rng(seed)
     time = np.arange(round(DURATION / PERIOD)) * PERIOD
@@ -62,7 +62,7 @@ def recorded(forward: float, backward: float, seed: int) -> Recording:
         for _ in range(round(PERIOD / model.opt.timestep)):
             mujoco.mj_step(model, data)
     angles += random.normal(0.0, 2e-4, len(time))
-    return Recording(
+    return RecordedTest(
         path=Path("valve"),
         machine="valve-arm",
         experiment="",

@@ -13,7 +13,7 @@ from rigtwin.components import VelocityServo, component_of
 from rigtwin.components.servo import push, push_law
 from rigtwin.description.mjcf import Change, write_mjcf
 from rigtwin.numerics.arrays import Array
-from rigtwin.recording import Recording
+from rigtwin.recording import RecordedTest
 
 MODEL = """<mujoco><option gravity="0 0 -9.81" timestep="1e-4" integrator="implicitfast"/>
 <worldbody><body name="upper"><joint name="shoulder" axis="0 1 0" damping="0.05"/>
@@ -45,7 +45,7 @@ def write_machine(folder: Path, *actuators: str) -> rigtwin.Machine:
     return rigtwin.machine(folder / "arm.toml")
 
 
-def drive(path: Path) -> Recording:
+def drive(path: Path) -> RecordedTest:
     """Recording of MuJoCo's own actuators."""
     model = mujoco.MjModel.from_xml_path(str(path))
     data, time = mujoco.MjData(model), PERIOD * np.arange(TICKS)
@@ -59,10 +59,10 @@ def drive(path: Path) -> Recording:
         "/command": {f"{n}_drive": row for n, row in zip(names, commands, strict=True)},
         "/sensor": {f"{n}_position": row for n, row in zip(names, positions, strict=True)},
     }
-    return Recording(Path("arm"), "arm", "", PERIOD, time, columns, {})
+    return RecordedTest(Path("arm"), "arm", "", PERIOD, time, columns, {})
 
 
-def predict(machine: rigtwin.Machine, recording: Recording) -> Array:
+def predict(machine: rigtwin.Machine, recording: RecordedTest) -> Array:
     configuration = machine.configuration_of(recording)
     model = machine.physics.model(machine, recording.inputs, configuration, 16)
     return model.predict(machine.plant)

@@ -26,7 +26,7 @@ from referee.wild_truth import (
 from rigtwin.description.catalogue import find
 from rigtwin.diagnosis.data_checks import find_faults
 from rigtwin.errors import RigtwinError
-from rigtwin.recording import Recording
+from rigtwin.recording import RecordedTest
 
 PERIOD = 1e-3
 
@@ -118,12 +118,12 @@ def every_case() -> list[WildCase]:
     return list(cases.values())
 
 
-def load(case: WildCase) -> Recording:
+def load(case: WildCase) -> RecordedTest:
     data = record_wild(case)
     ticks = len(next(iter(next(iter(data.columns.values())).values())))
     time = np.arange(ticks) * data.period
     name = find(MACHINES[case.machine]).name
-    return Recording(Path("wild"), name, "", data.period, time, data.columns, {})
+    return RecordedTest(Path("wild"), name, "", data.period, time, data.columns, {})
 
 
 @pytest.mark.parametrize("case", every_case(), ids=lambda c: f"{c.machine}-{'-'.join(c.parts)}")

@@ -246,10 +246,9 @@ def tune_compensator(
         Case of the building, 1 to 4. Defaults to 4.
     quake : str
         Earthquake: elcentro, kobe or morgan. Defaults to elcentro.
-    plants : int
-        Number of plants in the criterion, the nominal one included, 1 to 1000. Defaults to 8.
-    held_out_plants : int
-        Number of plants for the validation, 1 to 1000. Defaults to 12.
+    plants, held_out_plants : int
+        Numbers of plants in the criterion, the nominal one included, and in the validation, each
+        1 to 1000. Default to 8 and 12.
     evaluations : int
         Largest number of evaluations of the criterion, 3 to 1000. Defaults to 60.
     seed : int

@@ -23,7 +23,7 @@ from rigtwin.recording import reader
 from rigtwin.simulation.experiment import find_experiment
 from rigtwin.studies.friction_spikes import Calibration
 
-Recorded = reader.Recording | str | Path
+Recorded = reader.RecordedTest | str | Path
 """A recording, or the path of one."""
 LEAST_DETECTED, MOST_FALSE = 0.8, 0.1
 """Least share of reversals that a friction compensator detects, and most false steps per reversal,
@@ -138,8 +138,8 @@ class DiagnosisData:
     """
 
     machine: Machine
-    recordings: tuple[reader.Recording, ...]
-    held_out: tuple[reader.Recording, ...]
+    recordings: tuple[reader.RecordedTest, ...]
+    held_out: tuple[reader.RecordedTest, ...]
 
 
 def read_data(
@@ -284,7 +284,7 @@ def _as_list(recordings: Recorded | Sequence[Recorded]) -> list[Recorded]:
     return [recordings]
 
 
-def _has_duplicate(recordings: Sequence[reader.Recording]) -> bool:
+def _has_duplicate(recordings: Sequence[reader.RecordedTest]) -> bool:
     """Return whether two recordings are the same file. Those in memory have none."""
     # Resolved, since links and relative paths may name one file twice.
     paths = [recording.path.resolve() for recording in recordings if recording.path.exists()]

@@ -90,7 +90,7 @@ def is_model(machine: object) -> bool:
     return isinstance(machine, str | Path) and Path(machine).suffix.lower() in MODELS
 
 
-def needs_description(machine: object, logs: Sequence[Log | reader.Recording]) -> bool:
+def needs_description(machine: object, logs: Sequence[Log | reader.RecordedTest]) -> bool:
     """Return whether logs have to be read by a model, since they are no recordings.
 
     Parameters
@@ -103,9 +103,9 @@ def needs_description(machine: object, logs: Sequence[Log | reader.Recording]) -
     return is_model(machine) and not (logs and all(_is_recording(log) for log in logs))
 
 
-def _is_recording(log: Log | reader.Recording) -> bool:
+def _is_recording(log: Log | reader.RecordedTest) -> bool:
     """Return whether a log was recorded by rigtwin."""
-    if isinstance(log, reader.Recording):
+    if isinstance(log, reader.RecordedTest):
         return True
     # Only an MCAP file can be a recording; ROS 2 bags have that ending as well.
     if not isinstance(log, str | Path) or Path(log).suffix.lower() != ".mcap":
@@ -116,7 +116,7 @@ def _is_recording(log: Log | reader.Recording) -> bool:
         return False
 
 
-def log_files(log: Log | reader.Recording) -> tuple[Path, ...]:
+def log_files(log: Log | reader.RecordedTest) -> tuple[Path, ...]:
     """Return the files of a log.
 
     Parameters
@@ -129,7 +129,7 @@ def log_files(log: Log | reader.Recording) -> tuple[Path, ...]:
     RigtwinError
         For a recording, which needs no description.
     """
-    if isinstance(log, reader.Recording):
+    if isinstance(log, reader.RecordedTest):
         raise RigtwinError(
             f"{log.path}: it is a recording already; expected a log beside a model, or a "
             "description of its machine"
@@ -145,7 +145,7 @@ def log_files(log: Log | reader.Recording) -> tuple[Path, ...]:
     return (path,)
 
 
-def record_logs(described: Described, logs: Sequence[Log | reader.Recording]) -> list[Recording]:
+def record_logs(described: Described, logs: Sequence[Log | reader.RecordedTest]) -> list[Recording]:
     """Return all tests of logs as recordings of a described machine.
 
     Parameters

@@ -15,7 +15,7 @@ from rigtwin.simulation.experiment import experiments_of
 
 
 def energy_error(
-    recording: reader.Recording | str | Path,
+    recording: reader.RecordedTest | str | Path,
     *,
     machine: Machine | str | Path | None = None,
     settings: Settings = (),

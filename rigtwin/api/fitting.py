@@ -96,7 +96,7 @@ def _fit(
     fitted, short = drop_short(recordings_kept)
     judged, short_held_out = drop_short(data.held_out)
 
-    def gather(tests: Sequence[reader.Recording]) -> Evidence:
+    def gather(tests: Sequence[reader.RecordedTest]) -> Evidence:
         configurations = [data.machine.configuration_of(test, base) for test in tests]
         for recording, configuration in zip(tests, configurations, strict=True):
             require_fit(data.machine, recording, configuration, least_ticks(tests))

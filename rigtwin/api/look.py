@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 def look(
-    recording: reader.Recording | str | Path,
+    recording: reader.RecordedTest | str | Path,
     *,
     machine: Machine | str | Path | None = None,
     settings: Settings = (),

@@ -74,7 +74,7 @@ def machines() -> dict[str, Path]:
     return catalogue.shipped()
 
 
-def machine_of(recording: reader.Recording) -> Machine:
+def machine_of(recording: reader.RecordedTest) -> Machine:
     """Return the machine of a recording.
 
     In this order: the machine with which the recording was loaded, the description that the
@@ -108,7 +108,9 @@ def machine_of(recording: reader.Recording) -> Machine:
     )
 
 
-def described_machine(recording: reader.Recording, machine: Machine | str | Path | None) -> Machine:
+def described_machine(
+    recording: reader.RecordedTest, machine: Machine | str | Path | None
+) -> Machine:
     """Return the stated machine, or the recording's own one if `machine` is None."""
     return machine_of(recording) if machine is None else resolve_machine(machine)
 

@@ -21,7 +21,7 @@ from rigtwin.recording import export, reader
 
 
 @dataclass(frozen=True)
-class Recording(reader.Recording):
+class Recording(reader.RecordedTest):
     """One recorded test.
 
     `recording["/sensor.load_cell"]` is a channel, shape (ticks,). `recording.time` is its time in
@@ -208,16 +208,16 @@ def load(path: str | Path, machine: Machine | str | Path | None = None) -> Recor
     return with_machine(reader.load(Path(path)), described)
 
 
-def resolve_recording(recording: reader.Recording | str | Path) -> reader.Recording:
+def resolve_recording(recording: reader.RecordedTest | str | Path) -> reader.RecordedTest:
     """Return a recording; a path is read first. Raises RigtwinError for any other type."""
-    if isinstance(recording, reader.Recording):
+    if isinstance(recording, reader.RecordedTest):
         return recording
     if isinstance(recording, str | Path):
         return load(recording)
     raise RigtwinError(f"{recording!r:.60}: expected a recording, or the path of one")
 
 
-def with_machine(recording: reader.Recording, machine: Machine | None) -> Recording:
+def with_machine(recording: reader.RecordedTest, machine: Machine | None) -> Recording:
     """Return a recording with its machine attached, which spares a search for its description."""
     values = {attribute.name: getattr(recording, attribute.name) for attribute in fields(recording)}
     return Recording(**values, described=machine)

@@ -129,7 +129,7 @@ def names_of(argument: str, names: Sequence[str]) -> list[str]:
 
 
 def require_unrecorded(
-    settings: Settings, machine: Machine, recordings: Sequence[reader.Recording]
+    settings: Settings, machine: Machine, recordings: Sequence[reader.RecordedTest]
 ) -> None:
     """Refuse controller settings that have no effect because the recordings state their own.
 

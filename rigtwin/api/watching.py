@@ -97,7 +97,7 @@ def watch(
 
 
 def _start_watch(
-    recording: reader.Recording,
+    recording: reader.RecordedTest,
     machine: Machine | str | Path | None,
     settings: Settings,
     without: Sequence[str],
@@ -109,7 +109,7 @@ def _start_watch(
 
 def _read_intervals(
     path: Path, step: float, patience: float, stop: Callable[[], bool]
-) -> Iterator[tuple[reader.Recording, bool]]:
+) -> Iterator[tuple[reader.RecordedTest, bool]]:
     """Yield the window of a growing recording after each interval, and whether its test ended."""
     if not STEP <= step <= WINDOW - WARM:
         raise RigtwinError(f"step {step:g} s: expected {STEP:g} to {WINDOW - WARM:g} s")

@@ -26,7 +26,7 @@ from rigtwin.importing.convert import read_columns, read_tests
 from rigtwin.importing.map_file import parse
 from rigtwin.importing.mapping import Map
 from rigtwin.numerics.arrays import Array
-from rigtwin.recording import Recording
+from rigtwin.recording import RecordedTest
 
 MAP = "map.toml"
 """Name of the map's file beside a description."""
@@ -75,7 +75,7 @@ class Described:
                 lines.append(f"{signal.key} from {signal.source}: {'; '.join(remarks)}")
         return (*lines, *self.reading.notes)
 
-    def record(self, log: Sequence[Path] = ()) -> Recording:
+    def record(self, log: Sequence[Path] = ()) -> RecordedTest:
         """Return a log of one test as a recording of the machine.
 
         Parameters
@@ -96,7 +96,7 @@ class Described:
             raise RigtwinError(f"{files}: it holds {1 + len(others)} tests; expected one")
         return first
 
-    def records(self, log: Sequence[Path] = ()) -> tuple[Recording, ...]:
+    def records(self, log: Sequence[Path] = ()) -> tuple[RecordedTest, ...]:
         """Return the tests of a log as recordings of the machine.
 
         Parameters
@@ -120,13 +120,13 @@ class Described:
 
     def _recording(
         self, files: Sequence[Path], number: int | None, imported: Imported, notes: tuple[str, ...]
-    ) -> Recording:
+    ) -> RecordedTest:
         """A test of a log; number: that of its episode, None for a log of one test."""
         columns: dict[str, dict[str, Array]] = {}
         for (topic, name), values in imported.channels.items():
             columns.setdefault(topic, {})[name] = values
         suffix = "" if number is None else f" episode {number}"
-        return Recording(
+        return RecordedTest(
             path=Path(f"{files[0]}{suffix}"),
             machine=self.machine.name,
             experiment=" ".join(path.stem for path in files) + suffix,

@@ -23,7 +23,7 @@ from rigtwin.description.prior import ModelPrior
 from rigtwin.description.settings import Nothing
 from rigtwin.description.tolerance import Tolerance
 from rigtwin.errors import RigtwinError
-from rigtwin.recording import Recording
+from rigtwin.recording import RecordedTest
 
 FORM = {"position": 0.003, "velocity": 0.003, "force": 0.01, "command": 0.01}
 """Kind of signal → default model error, as a share of the signal. Forces are modelled less
@@ -276,7 +276,7 @@ class Machine:
         return self.physics.configure(self)
 
     def configuration_of(
-        self, recording: Recording, base: Configuration | None = None
+        self, recording: RecordedTest, base: Configuration | None = None
     ) -> Configuration:
         """Return the settings of the twin of a recording.
 

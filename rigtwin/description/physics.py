@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from rigtwin.description.configuration import Configuration
 from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
-from rigtwin.recording import Inputs, Recording
+from rigtwin.recording import Inputs, RecordedTest
 
 if TYPE_CHECKING:
     from rigtwin.components.plant import Plant
@@ -206,11 +206,11 @@ class Physics(ABC):
     @abstractmethod
     def simulate(
         self, machine: Machine, name: str, configuration: Configuration, demands: Any, seed: int
-    ) -> Recording:
+    ) -> RecordedTest:
         """Return the recording that a test without limits would make, in memory."""
 
     @abstractmethod
-    def excite(self, machine: Machine) -> Iterator[Recording]:
+    def excite(self, machine: Machine) -> Iterator[RecordedTest]:
         """Yield recordings of the twin under rich motions within the joints' ranges."""
 
     def demand_motions(
@@ -263,7 +263,7 @@ class Physics(ABC):
         """
 
     def energy_error(
-        self, recording: Recording, configuration: Configuration, known: bool = False
+        self, recording: RecordedTest, configuration: Configuration, known: bool = False
     ) -> EnergyError | None:
         """Return the energy that a hybrid test's loop puts in, or None for other tests.
 
@@ -282,7 +282,9 @@ class Physics(ABC):
         """Return controller settings that the corrected plant asks for."""
         return {}
 
-    def find_compensator(self, recording: Recording, configuration: Configuration) -> Calibration:
+    def find_compensator(
+        self, recording: RecordedTest, configuration: Configuration
+    ) -> Calibration:
         """Return the settings of a friction compensator that a recording asks for.
 
         Raises
@@ -350,15 +352,15 @@ class Physics(ABC):
     ) -> dict[str, Array]:
         """Return joint → position at every tick, m or rad; joints without a signal are left out."""
 
-    def require_motion(self, recording: Recording) -> None:  # noqa: B027
+    def require_motion(self, recording: RecordedTest) -> None:  # noqa: B027
         """Raise RigtwinError if a channel that pictures need is missing."""
 
-    def deflection(self, recording: Recording) -> Array | None:
+    def deflection(self, recording: RecordedTest) -> Array | None:
         """Return the shape of flexible parts at every tick, or None if there are none."""
         return None
 
     @abstractmethod
-    def curves(self, machine: Machine, recording: Recording) -> list[Curve]:
+    def curves(self, machine: Machine, recording: RecordedTest) -> list[Curve]:
         """Return the curves to draw under the scene."""
 
     # Tuning

@@ -26,12 +26,12 @@ from rigtwin.diagnosis.result import Diagnosis
 from rigtwin.diagnosis.thresholds import STANDARD, Thresholds
 from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
-from rigtwin.recording import Recording
+from rigtwin.recording import RecordedTest
 
 
 def find_changes(
     machine: Machine,
-    recordings: Sequence[Recording],
+    recordings: Sequence[RecordedTest],
     base: Configuration | None = None,
     progress: Callable[[str, int], object] = lambda _stage, _steps: None,
     thresholds: Thresholds = STANDARD,
@@ -93,11 +93,11 @@ def find_changes(
 
 def _align_zeros(
     machine: Machine,
-    recordings: Sequence[Recording],
-    diagnose_set: Callable[[Sequence[Recording]], Diagnosis],
+    recordings: Sequence[RecordedTest],
+    diagnose_set: Callable[[Sequence[RecordedTest]], Diagnosis],
     progress: Callable[[str, int], object],
     thresholds: Thresholds,
-) -> tuple[list[Recording], dict[str, tuple[float, ...]], ChangeSearch]:
+) -> tuple[list[RecordedTest], dict[str, tuple[float, ...]], ChangeSearch]:
     """Subtract zeros of sensors that differ between recordings, and diagnose what results.
 
     Returns the recordings, the zeros about their mean by sensor, and the search prepared on the
@@ -128,8 +128,8 @@ def _align_zeros(
 
 def _find_best_model(
     search: ChangeSearch,
-    aligned: Sequence[Recording],
-    diagnose_set: Callable[[Sequence[Recording]], Diagnosis],
+    aligned: Sequence[RecordedTest],
+    diagnose_set: Callable[[Sequence[RecordedTest]], Diagnosis],
     thresholds: Thresholds,
 ) -> ChangeModel:
     """Search for changes, and once more from the first and the last recording if that may help."""
@@ -144,8 +144,8 @@ def _find_best_model(
 def _restart(
     model: ChangeModel,
     search: ChangeSearch,
-    starts: Sequence[Recording],
-    diagnose_set: Callable[[Sequence[Recording]], Diagnosis],
+    starts: Sequence[RecordedTest],
+    diagnose_set: Callable[[Sequence[RecordedTest]], Diagnosis],
     thresholds: Thresholds,
 ) -> ChangeModel:
     """Search again from the diagnoses of single recordings, and return the best model.
@@ -166,7 +166,9 @@ def _restart(
     return model
 
 
-def _subtract_zeros(machine: Machine, recording: Recording, zeros: dict[str, float]) -> Recording:
+def _subtract_zeros(
+    machine: Machine, recording: RecordedTest, zeros: dict[str, float]
+) -> RecordedTest:
     """Recording with the zeros of sensors, SI, subtracted from their signals."""
     columns = {topic: dict(names) for topic, names in recording.columns.items()}
     for name, zero in zeros.items():

@@ -18,7 +18,7 @@ from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.residual import Residual, compute_residual
 from rigtwin.diagnosis.shrinkage import gap_level
 from rigtwin.errors import RigtwinError
-from rigtwin.recording import Recording
+from rigtwin.recording import RecordedTest
 from rigtwin.signals.noise import remove_mains, white_noise
 
 STILL = 0.1
@@ -51,7 +51,7 @@ class Comparison:
 
 def compare(
     machine: Machine,
-    recording: Recording,
+    recording: RecordedTest,
     configuration: Configuration | None = None,
     progress: Callable[[str], object] = lambda _: None,
 ) -> Comparison:
@@ -137,7 +137,7 @@ def signal_residuals(evidence: Evidence) -> dict[str, Residual]:
     }
 
 
-def differences(first: Recording, second: Recording) -> tuple[str, ...]:
+def differences(first: RecordedTest, second: RecordedTest) -> tuple[str, ...]:
     """Return the test conditions that differ between two recordings.
 
     Parameters
@@ -179,7 +179,7 @@ def differences(first: Recording, second: Recording) -> tuple[str, ...]:
 
 
 def compare_recordings(
-    machine: Machine, first: Recording, second: Recording
+    machine: Machine, first: RecordedTest, second: RecordedTest
 ) -> dict[str, Residual]:
     """Compare two recordings of one test, sensor by sensor over their common length.
 
@@ -240,7 +240,7 @@ def compare_recordings(
     return results
 
 
-def _require_comparable(machine: Machine, first: Recording, second: Recording) -> None:
+def _require_comparable(machine: Machine, first: RecordedTest, second: RecordedTest) -> None:
     """Raise RigtwinError unless two recordings can be compared tick by tick."""
     for recording in (first, second):
         if recording.machine != machine.name:

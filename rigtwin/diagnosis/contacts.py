@@ -9,7 +9,7 @@ import numpy as np
 from rigtwin.description.machine import Machine
 from rigtwin.description.mechanism import Mechanism
 from rigtwin.numerics.arrays import Array
-from rigtwin.recording import Recording
+from rigtwin.recording import RecordedTest
 
 POSES = 1000
 """Poses of a recording in which contacts are looked for, at most."""
@@ -17,7 +17,7 @@ PAIRS = 3
 """Pairs of geoms that are named; the rest is counted."""
 
 
-def find_contacts(machine: Machine, recording: Recording) -> list[str]:
+def find_contacts(machine: Machine, recording: RecordedTest) -> list[str]:
     """Say which geoms of the MJCF touch in the recorded poses, and for how long.
 
     Parameters

@@ -20,7 +20,7 @@ from rigtwin.description.control import Control
 from rigtwin.diagnosis.residual import rounding
 from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
-from rigtwin.recording import Recording
+from rigtwin.recording import RecordedTest
 from rigtwin.signals.noise import rms
 
 EXACT = 20.0
@@ -75,7 +75,7 @@ class Deviation:
 class ControllerReplay:
     """Replay of a controller on the recorded inputs, compared with the recorded commands."""
 
-    def __init__(self, control: Control, recording: Recording, settings: Any) -> None:
+    def __init__(self, control: Control, recording: RecordedTest, settings: Any) -> None:
         """Read the inputs and commands of a recording.
 
         Parameters

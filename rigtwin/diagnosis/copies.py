@@ -12,10 +12,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from rigtwin.errors import RigtwinError
-from rigtwin.recording import Recording
+from rigtwin.recording import RecordedTest
 
 
-def digest(recording: Recording) -> str:
+def digest(recording: RecordedTest) -> str:
     """Compute a digest of a recording's columns.
 
     Parameters
@@ -37,7 +37,7 @@ def digest(recording: Recording) -> str:
     return content.hexdigest()
 
 
-def drop_copies(recordings: Sequence[Recording]) -> tuple[list[Recording], list[str]]:
+def drop_copies(recordings: Sequence[RecordedTest]) -> tuple[list[RecordedTest], list[str]]:
     """Keep one recording of each content.
 
     Parameters
@@ -50,7 +50,7 @@ def drop_copies(recordings: Sequence[Recording]) -> tuple[list[Recording], list[
     tuple
         Recordings without copies, in their order, and a note for each copy.
     """
-    distinct: dict[str, Recording] = {}
+    distinct: dict[str, RecordedTest] = {}
     notes = []
     for recording in recordings:
         first = distinct.setdefault(digest(recording), recording)
@@ -61,7 +61,7 @@ def drop_copies(recordings: Sequence[Recording]) -> tuple[list[Recording], list[
     return list(distinct.values()), notes
 
 
-def refuse_copies(held_out: Sequence[Recording], fitted: Sequence[Recording]) -> None:
+def refuse_copies(held_out: Sequence[RecordedTest], fitted: Sequence[RecordedTest]) -> None:
     """Refuse held-out recordings whose data are those of the fit.
 
     Parameters

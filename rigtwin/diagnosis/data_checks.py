@@ -17,7 +17,7 @@ from rigtwin.diagnosis.direction import runs_backwards
 from rigtwin.diagnosis.units import spell
 from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
-from rigtwin.recording import Recording
+from rigtwin.recording import RecordedTest
 from rigtwin.signals.noise import rms, smallest_step, white_noise
 from rigtwin.signals.runs import find_cut_off, longest_run
 
@@ -86,7 +86,7 @@ class Fault:
 
 def find_faults(
     machine: Machine,
-    recording: Recording,
+    recording: RecordedTest,
     configuration: Configuration,
     least: int = SHORTEST,
 ) -> tuple[Fault, ...]:
@@ -130,7 +130,7 @@ def find_faults(
 
 def require_fit(
     machine: Machine,
-    recording: Recording,
+    recording: RecordedTest,
     configuration: Configuration,
     least: int = SHORTEST,
 ) -> tuple[Fault, ...]:
@@ -159,7 +159,7 @@ def channels(machine: Machine) -> list[tuple[str, str]]:
     return list(dict.fromkeys(required))
 
 
-def _check_presence(machine: Machine, recording: Recording, least: int) -> Iterator[Fault]:
+def _check_presence(machine: Machine, recording: RecordedTest, least: int) -> Iterator[Fault]:
     if recording.machine != machine.name:
         yield Fault(
             "wrong machine",
@@ -196,7 +196,7 @@ def _check_presence(machine: Machine, recording: Recording, least: int) -> Itera
         yield Fault("too short", "recording", message)
 
 
-def _check_values(machine: Machine, recording: Recording) -> Iterator[Fault]:
+def _check_values(machine: Machine, recording: RecordedTest) -> Iterator[Fault]:
     steps = np.diff(recording.time)
     # Half a period tells the jitter of a clock from a lost tick.
     gaps = np.nonzero(np.abs(steps - recording.period) > 0.5 * recording.period)[0]
@@ -229,7 +229,7 @@ def _check_values(machine: Machine, recording: Recording) -> Iterator[Fault]:
             )
 
 
-def _check_alive(machine: Machine, recording: Recording, predicted: Array) -> Iterator[Fault]:
+def _check_alive(machine: Machine, recording: RecordedTest, predicted: Array) -> Iterator[Fault]:
     if not any(np.ptp(recording.column(*channel)) for channel in channels(machine)):
         yield Fault("dead", "recording", "no channel changes throughout: nothing was recorded")
         return
@@ -295,7 +295,7 @@ def _check_clipping(where: str, signal: Array) -> Iterator[Fault]:
 
 
 def _check_inputs(
-    machine: Machine, recording: Recording, configuration: Configuration, predicted: Array
+    machine: Machine, recording: RecordedTest, configuration: Configuration, predicted: Array
 ) -> Iterator[Fault]:
     dead = dead_commands(machine, recording, configuration)
     for where, moved in dead.items():
@@ -306,7 +306,7 @@ def _check_inputs(
         yield Fault("backwards", "recording", message)
 
 
-def _check_order(machine: Machine, recording: Recording, predicted: Array) -> Iterator[Fault]:
+def _check_order(machine: Machine, recording: RecordedTest, predicted: Array) -> Iterator[Fault]:
     """Yield exchanged channels: another order of the sensors of one unit fits far better."""
     # Sensors of different units cannot be exchanged unnoticed: their scales would be wrong.
     for unit in dict.fromkeys(row.unit for row in machine.rows if row.kind != "command"):
@@ -356,7 +356,7 @@ def _check_order(machine: Machine, recording: Recording, predicted: Array) -> It
             yield Fault("swapped", "/sensor", f"channels of /sensor are swapped: {swapped}")
 
 
-def _check_scale(machine: Machine, recording: Recording, predicted: Array) -> Iterator[Fault]:
+def _check_scale(machine: Machine, recording: RecordedTest, predicted: Array) -> Iterator[Fault]:
     """Yield wrong signs and units, by comparing signals with the nominal prediction."""
     far = machine.prior.implausible_scale
     odd: dict[Row, float] = {}
@@ -399,7 +399,7 @@ def _check_scale(machine: Machine, recording: Recording, predicted: Array) -> It
 
 
 def _unexplained_scales(
-    machine: Machine, recording: Recording, odd: Mapping[Row, float]
+    machine: Machine, recording: RecordedTest, odd: Mapping[Row, float]
 ) -> dict[Row, float]:
     """Return the implausible scales that no physical cause explains."""
     suspicious = dict(odd)
@@ -420,7 +420,7 @@ def _unexplained_scales(
     return suspicious
 
 
-def _is_wound_up(machine: Machine, recording: Recording) -> bool:
+def _is_wound_up(machine: Machine, recording: RecordedTest) -> bool:
     """Return whether a force actuator's command is at its limit for long."""
     for name in _movers(machine):
         component = machine.components[name]

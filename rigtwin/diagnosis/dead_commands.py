@@ -13,7 +13,7 @@ from rigtwin.components.quantity import fields
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import OWN, Machine
 from rigtwin.numerics.arrays import Array
-from rigtwin.recording import Recording
+from rigtwin.recording import RecordedTest
 from rigtwin.signals.noise import remove_mains, white_noise
 
 LEAST_CHANGE = 1e-9
@@ -23,7 +23,7 @@ LEAST_MOTION = 10.0
 
 
 def dead_commands(
-    machine: Machine, recording: Recording, configuration: Configuration
+    machine: Machine, recording: RecordedTest, configuration: Configuration
 ) -> dict[str, str]:
     """Find command channels that are constant although the command changed.
 
@@ -57,7 +57,7 @@ def dead_commands(
 
 
 def _computed_commands(
-    machine: Machine, recording: Recording, configuration: Configuration
+    machine: Machine, recording: RecordedTest, configuration: Configuration
 ) -> dict[tuple[str, str], Array]:
     """Return the commands of the described controller for the recorded inputs.
 
@@ -79,7 +79,7 @@ def _computed_commands(
     }
 
 
-def _moving_follower(machine: Machine, recording: Recording, name: str) -> str | None:
+def _moving_follower(machine: Machine, recording: RecordedTest, name: str) -> str | None:
     """Return the channel of a position sensor that moves at the joint of a position actuator.
 
     The motion must exceed noise, mains and the compliance of a cylinder under the measured load.

@@ -70,7 +70,7 @@ from rigtwin.diagnosis.usable_data import (
     recording_notes,
 )
 from rigtwin.numerics.arrays import Array
-from rigtwin.recording import Recording
+from rigtwin.recording import RecordedTest
 from rigtwin.simulation.energy import EnergyError
 from rigtwin.simulation.experiment import Experiment
 
@@ -113,9 +113,9 @@ class _Judged:
 
 def diagnose(
     machine: Machine,
-    recordings: Sequence[Recording],
+    recordings: Sequence[RecordedTest],
     base: Configuration | None = None,
-    held_out: Sequence[Recording] = (),
+    held_out: Sequence[RecordedTest] = (),
     tests: Sequence[Experiment] = (),
     progress: Callable[[str, int], object] = lambda _stage, _steps: None,
     thresholds: Thresholds = STANDARD,
@@ -176,8 +176,8 @@ def diagnose(
 
 def _gather_evidence(
     part: Machine,
-    fitted: tuple[list[Recording], list[Configuration]],
-    judging: tuple[list[Recording], list[Configuration]],
+    fitted: tuple[list[RecordedTest], list[Configuration]],
+    judging: tuple[list[RecordedTest], list[Configuration]],
 ) -> tuple[Evidence, Evidence | None]:
     """Evidence of a part of a machine, and that of the held-out recordings if there are any."""
     held_out = Evidence(part, *judging) if judging[0] else None
@@ -204,7 +204,7 @@ def _diagnose_parts(
     return parts[0] if len(parts) == 1 else join(*evidence_of(machine), parts, started)
 
 
-def _contact_notes(machine: Machine, recordings: Sequence[Recording]) -> list[str]:
+def _contact_notes(machine: Machine, recordings: Sequence[RecordedTest]) -> list[str]:
     return [
         f"{recording.path.name}: {line}"
         for recording in recordings
@@ -213,7 +213,7 @@ def _contact_notes(machine: Machine, recordings: Sequence[Recording]) -> list[st
 
 
 def _configure_held_out(
-    machine: Machine, held_out: Sequence[Recording], base: Configuration | None
+    machine: Machine, held_out: Sequence[RecordedTest], base: Configuration | None
 ) -> list[Configuration]:
     """Settings of the held-out recordings; raises where one of them cannot be compared."""
     configurations = [machine.configuration_of(recording, base) for recording in held_out]

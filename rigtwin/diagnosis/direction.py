@@ -12,7 +12,7 @@ import numpy as np
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Machine
 from rigtwin.numerics.arrays import Array
-from rigtwin.recording import Recording
+from rigtwin.recording import RecordedTest
 from rigtwin.signals.noise import rms, white_noise
 
 STEPS = 2
@@ -27,7 +27,7 @@ than predicted is missed in both directions, and less from its quiet end."""
 
 
 def runs_backwards(
-    machine: Machine, recording: Recording, configuration: Configuration, predicted: Array
+    machine: Machine, recording: RecordedTest, configuration: Configuration, predicted: Array
 ) -> bool:
     """Return whether the machine explains a recording far better backwards than forwards.
 

@@ -41,7 +41,7 @@ from rigtwin.diagnosis.lines import smooth, spectrum_of_noise, weigh_lines
 from rigtwin.diagnosis.spikes import JUMPS, SPIKE, despike
 from rigtwin.models.model import Model
 from rigtwin.numerics.arrays import Array
-from rigtwin.recording import Recording
+from rigtwin.recording import RecordedTest
 from rigtwin.signals.noise import remove_mains, white_noise
 
 ROUNDING_FACTOR = 4.0
@@ -64,7 +64,7 @@ UNKNOWN_ENDS = 10
 
 
 def _model_with_enough_steps(
-    machine: Machine, recording: Recording, configuration: Configuration, most: int
+    machine: Machine, recording: RecordedTest, configuration: Configuration, most: int
 ) -> Model[Any]:
     """Return the model with the fewest integration steps per tick that predict precisely enough.
 
@@ -122,7 +122,7 @@ class Evidence:
     def __init__(
         self,
         machine: Machine,
-        recordings: Sequence[Recording],
+        recordings: Sequence[RecordedTest],
         configurations: Sequence[Configuration],
         counted: Sequence[Array] | None = None,
         steps: int = 4,

@@ -20,7 +20,7 @@ from rigtwin.description.machine import Machine
 from rigtwin.diagnosis.spikes import JUMPS, SPIKE, despike
 from rigtwin.models.model import Model
 from rigtwin.numerics.arrays import Array
-from rigtwin.recording import Recording
+from rigtwin.recording import RecordedTest
 from rigtwin.signals.band import limit_band
 from rigtwin.signals.noise import smallest_step, white_noise
 from rigtwin.signals.runs import find_cut_off
@@ -82,7 +82,7 @@ class Lines:
 
 
 def weigh_lines(
-    machine: Machine, recording: Recording, model: Model[Any], plant: Plant, counted: Array
+    machine: Machine, recording: RecordedTest, model: Model[Any], plant: Plant, counted: Array
 ) -> Lines:
     """Transform a recording to the frequency domain and weigh each line of its signals.
 
@@ -200,7 +200,7 @@ def _residual_noise(floor: Array, propagated: Array | None, within: float) -> Ar
     return np.maximum(noise, 1e-300)
 
 
-def _windows(recording: Recording, model: Model[Any], whole: Array, counted: Array) -> Array:
+def _windows(recording: RecordedTest, model: Model[Any], whole: Array, counted: Array) -> Array:
     """Return the window of each signal: 0 where a sensor is cut off or the model undetermined."""
     fade = np.stack(
         [

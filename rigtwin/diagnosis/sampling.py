@@ -16,7 +16,7 @@ from rigtwin.components.plant import Plant, parameter_of
 from rigtwin.components.sensors import sensor_of
 from rigtwin.description.machine import Machine
 from rigtwin.numerics.arrays import Array
-from rigtwin.recording import Recording
+from rigtwin.recording import RecordedTest
 from rigtwin.signals.noise import remove_mains, rms, smallest_step, white_noise
 
 OUTSTANDING = 1.6
@@ -83,7 +83,7 @@ def properties(signal: Array, predicted: Array, period: float, mains: float) -> 
 
 def find_outstanding(
     machine: Machine,
-    recordings: Sequence[Recording],
+    recordings: Sequence[RecordedTest],
     predicted: Sequence[Array],
     plant: Plant,
 ) -> tuple[SensorProperty, ...]:
@@ -131,7 +131,7 @@ def find_outstanding(
 
 
 def _properties_by_sensor(
-    machine: Machine, recordings: Sequence[Recording], predicted: Sequence[Array], plant: Plant
+    machine: Machine, recordings: Sequence[RecordedTest], predicted: Sequence[Array], plant: Plant
 ) -> dict[str, dict[str, float]]:
     """Return the properties of each sensor with declared noise, over all recordings."""
     table: dict[str, dict[str, float]] = {}

@@ -9,10 +9,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from rigtwin.diagnosis.data_checks import SHORTEST, SHORTEST_PART, SHORTEST_TIME
-from rigtwin.recording import Recording
+from rigtwin.recording import RecordedTest
 
 
-def drop_short(recordings: Sequence[Recording]) -> tuple[list[Recording], list[str]]:
+def drop_short(recordings: Sequence[RecordedTest]) -> tuple[list[RecordedTest], list[str]]:
     """Leave out the recordings that are too short to be a part of a set.
 
     Parameters
@@ -43,7 +43,7 @@ def drop_short(recordings: Sequence[Recording]) -> tuple[list[Recording], list[s
     return (long_enough, notes) if long_enough else (list(recordings), [])
 
 
-def least_ticks(recordings: Sequence[Recording]) -> int:
+def least_ticks(recordings: Sequence[RecordedTest]) -> int:
     """Return the number of ticks that every recording of a set must have.
 
     Parameters

@@ -19,7 +19,7 @@ from rigtwin.description.machine import Machine, ReplayOf, Row
 from rigtwin.diagnosis.units import say
 from rigtwin.diagnosis.words import name_part
 from rigtwin.numerics.arrays import Array
-from rigtwin.recording import Recording
+from rigtwin.recording import RecordedTest
 from rigtwin.signals.noise import smallest_step, white_noise
 
 BLOCKS = 50
@@ -55,7 +55,7 @@ class Standstill:
     travel: float
 
 
-def find_standstill(machine: Machine, recordings: Sequence[Recording]) -> tuple[Standstill, ...]:
+def find_standstill(machine: Machine, recordings: Sequence[RecordedTest]) -> tuple[Standstill, ...]:
     """Find joints that stood still although the twin's actuators would have moved them.
 
     Parameters
@@ -98,7 +98,7 @@ def describe_standstill(machine: Machine, standing: Sequence[Standstill]) -> str
 
 
 def _stands(
-    machine: Machine, replay: ReplayOf, row: Row, recordings: Sequence[Recording]
+    machine: Machine, replay: ReplayOf, row: Row, recordings: Sequence[RecordedTest]
 ) -> Standstill | None:
     """Return the standstill of one observed joint; None if it moved or was not pushed."""
     components, plant = machine.components, machine.plant

@@ -12,7 +12,7 @@ import numpy as np
 from rigtwin.components import PUSHERS, PositionActuator, component_of
 from rigtwin.description.machine import Machine
 from rigtwin.description.mechanism import Mechanism
-from rigtwin.recording import Recording
+from rigtwin.recording import RecordedTest
 
 COMMANDED = (*PUSHERS, PositionActuator)
 """Types of actuators whose commands have declared limits."""
@@ -20,7 +20,7 @@ NEAR = 1e-3
 """Distance from an end of the range, as a share of it, within which a joint is at a stop."""
 
 
-def find_stops(machine: Machine, recordings: Sequence[Recording]) -> list[str]:
+def find_stops(machine: Machine, recordings: Sequence[RecordedTest]) -> list[str]:
     """Find joints that reach a stop which the model does not predict.
 
     Parameters
@@ -65,7 +65,7 @@ def find_stops(machine: Machine, recordings: Sequence[Recording]) -> list[str]:
     return notes
 
 
-def find_cut_commands(machine: Machine, recordings: Sequence[Recording]) -> list[str]:
+def find_cut_commands(machine: Machine, recordings: Sequence[RecordedTest]) -> list[str]:
     """Find commands that exceed the limits of their actuators.
 
     Parameters

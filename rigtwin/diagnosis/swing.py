@@ -9,10 +9,10 @@ import numpy as np
 from rigtwin.components import Schedule
 from rigtwin.components.effect import SHARES, Swing
 from rigtwin.description.machine import Machine
-from rigtwin.recording import Recording
+from rigtwin.recording import RecordedTest
 
 
-def swings(machine: Machine, recordings: Sequence[Recording]) -> dict[str, Swing]:
+def swings(machine: Machine, recordings: Sequence[RecordedTest]) -> dict[str, Swing]:
     """Return the swing of each command and of each channel that forces follow.
 
     Saturations and rate limits start from it: a limit that the commands never reach has no effect.

@@ -14,12 +14,12 @@ from rigtwin.diagnosis.finding import (
 )
 from rigtwin.diagnosis.short_recordings import drop_short, least_ticks
 from rigtwin.diagnosis.standstill import describe_standstill, find_standstill
-from rigtwin.recording import Recording
+from rigtwin.recording import RecordedTest
 
 
 def answer_unusable(
     machine: Machine,
-    recordings: Sequence[Recording],
+    recordings: Sequence[RecordedTest],
     configurations: Sequence[Configuration],
     started: float,
 ) -> Answer | None:
@@ -50,7 +50,7 @@ def answer_unusable(
 
 def _answer_faults(
     machine: Machine,
-    recordings: Sequence[Recording],
+    recordings: Sequence[RecordedTest],
     configurations: Sequence[Configuration],
     started: float,
 ) -> Answer | None:
@@ -81,7 +81,7 @@ def _answer_faults(
 
 
 def _answer_standstill(
-    machine: Machine, recordings: Sequence[Recording], started: float
+    machine: Machine, recordings: Sequence[RecordedTest], started: float
 ) -> Answer | None:
     """Answer for recordings in which nothing moved; None where something did."""
     standing = find_standstill(machine, recordings)
@@ -97,7 +97,7 @@ def _answer_standstill(
     )
 
 
-def recording_notes(recordings: Sequence[Recording]) -> tuple[str, ...]:
+def recording_notes(recordings: Sequence[RecordedTest]) -> tuple[str, ...]:
     """Return the notes that the reader made of recordings, with the names of their files."""
     names: dict[str, list[str]] = {}
     for recording in recordings:
@@ -111,8 +111,8 @@ def recording_notes(recordings: Sequence[Recording]) -> tuple[str, ...]:
 
 
 def drop_unneeded(
-    recordings: Sequence[Recording], held_out: Sequence[Recording]
-) -> tuple[list[Recording], list[Recording], list[str]]:
+    recordings: Sequence[RecordedTest], held_out: Sequence[RecordedTest]
+) -> tuple[list[RecordedTest], list[RecordedTest], list[str]]:
     """Leave out copies and recordings that are too short.
 
     Parameters

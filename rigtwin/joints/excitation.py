@@ -14,7 +14,7 @@ from rigtwin.description.mechanism import Mechanism
 from rigtwin.errors import RigtwinError
 from rigtwin.models.demands import demanded_channels
 from rigtwin.numerics.arrays import Array
-from rigtwin.recording import Recording
+from rigtwin.recording import RecordedTest
 from rigtwin.signals.excitation import multisine
 
 SECONDS = 8.0
@@ -34,7 +34,7 @@ Reach = tuple[float, float]
 
 def excite(
     machine: Machine, reach: Callable[[Machine, tuple[str, str]], Reach | None], least_period: float
-) -> Iterator[Recording]:
+) -> Iterator[RecordedTest]:
     """Yield recordings of multisines that no limit ends; none if a range is unknown.
 
     Parameters

@@ -16,7 +16,7 @@ from rigtwin.description.overlooked import overlooked
 from rigtwin.description.physics import Columns, Physics, TwinTest
 from rigtwin.description.settings import Nothing
 from rigtwin.numerics.arrays import Array
-from rigtwin.recording import Inputs, Recording
+from rigtwin.recording import Inputs, RecordedTest
 
 if TYPE_CHECKING:
     from rigtwin.description.mechanism import Mechanism
@@ -107,7 +107,7 @@ class IndependentJoints(Physics):
 
     def simulate(
         self, machine: Machine, name: str, configuration: Configuration, demands: Any, seed: int
-    ) -> Recording:
+    ) -> RecordedTest:
         from rigtwin.models.machine_twin import simulate_machine
 
         # Without limits, the motion shows how far the machine would go.
@@ -116,7 +116,7 @@ class IndependentJoints(Physics):
         columns, _ = simulate_machine(machine, configuration, demands, seed)
         period = configuration.timing.period
         ticks = next(len(signal) for names in columns.values() for signal in names.values())
-        return Recording(
+        return RecordedTest(
             path=Path(name),
             machine=machine.name,
             experiment=name,
@@ -126,7 +126,7 @@ class IndependentJoints(Physics):
             controller=flatten(configuration).get("controller", {}),
         )
 
-    def excite(self, machine: Machine) -> Iterator[Recording]:
+    def excite(self, machine: Machine) -> Iterator[RecordedTest]:
         from rigtwin.joints.excitation import excite
 
         return excite(machine, self.reach, self.least_period)
@@ -195,7 +195,7 @@ class IndependentJoints(Physics):
 
         return joint_positions(machine, columns, period)
 
-    def curves(self, machine: Machine, recording: Recording) -> list[Curve]:
+    def curves(self, machine: Machine, recording: RecordedTest) -> list[Curve]:
         from rigtwin.render.curves import Curve
         from rigtwin.render.style import COLOURS
 

@@ -30,7 +30,7 @@ from rigtwin.looking.motions import find_positions, predicts_motion
 from rigtwin.looking.prediction import Prediction, judge
 from rigtwin.looking.slider import Slider, sliders_of
 from rigtwin.numerics.arrays import Array
-from rigtwin.recording import Recording
+from rigtwin.recording import RecordedTest
 
 
 class Look:
@@ -53,7 +53,7 @@ class Look:
     """
 
     def __init__(
-        self, machine: Machine, recording: Recording, base: Configuration | None = None
+        self, machine: Machine, recording: RecordedTest, base: Configuration | None = None
     ) -> None:
         """Prepare the model of a recording.
 

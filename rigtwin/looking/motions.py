@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from rigtwin.description.machine import Machine
 from rigtwin.numerics.arrays import Array
-from rigtwin.recording import Recording
+from rigtwin.recording import RecordedTest
 
 MOTIONS = ("position", "velocity")
 """Kinds of signal that determine a joint's position."""
@@ -16,7 +16,7 @@ def predicts_motion(machine: Machine) -> bool:
 
 
 def find_positions(
-    machine: Machine, recording: Recording, period: float, signals: Array | None = None
+    machine: Machine, recording: RecordedTest, period: float, signals: Array | None = None
 ) -> dict[str, Array]:
     """Return the positions of the joints.
 

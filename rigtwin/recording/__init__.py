@@ -1,7 +1,7 @@
 """Recordings: one MCAP file per test, with a `Writer`, `load`, and export to CSV and MAT."""
 
 from rigtwin.recording.inputs import Inputs
-from rigtwin.recording.reader import Recording, load
+from rigtwin.recording.reader import RecordedTest, load
 from rigtwin.recording.writer import Writer, twin_values
 
-__all__ = ["Inputs", "Recording", "Writer", "load", "twin_values"]
+__all__ = ["Inputs", "RecordedTest", "Writer", "load", "twin_values"]

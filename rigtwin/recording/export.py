@@ -13,7 +13,7 @@ from scipy.io import savemat
 from rigtwin.errors import RigtwinError
 from rigtwin.files import atomic_write
 from rigtwin.recording.channels import channels_of
-from rigtwin.recording.reader import Recording
+from rigtwin.recording.reader import RecordedTest
 
 SHORT, LONGEST = 31, 55
 """Number of characters of a name that every MATLAB reads, and the maximum. A unit's name has its
@@ -21,7 +21,7 @@ topic in front, and MATLAB allows 63 characters in total."""
 MATLAB_NAME = re.compile(rf"[A-Za-z][A-Za-z0-9_]{{0,{LONGEST - 1}}}")
 
 
-def export(recording: Recording, path: Path) -> None:
+def export(recording: RecordedTest, path: Path) -> None:
     """Write every channel to a file whose format follows its suffix, .csv or .mat.
 
     Raises
@@ -37,7 +37,7 @@ def export(recording: Recording, path: Path) -> None:
     atomic_write(path, writers[path.suffix.lower()](recording))
 
 
-def _csv(recording: Recording) -> bytes:
+def _csv(recording: RecordedTest) -> bytes:
     channels = channels_of(recording.columns, recording.machine)
     names = ["time", *(f"{channel.topic[1:]}.{channel.name}" for channel in channels)]
     units = ["s", *(channel.unit for channel in channels)]
@@ -52,7 +52,7 @@ def _csv(recording: Recording) -> bytes:
     return written.getvalue().encode()
 
 
-def _mat(recording: Recording) -> bytes:
+def _mat(recording: RecordedTest) -> bytes:
     for channel in recording.columns.values():
         for name in channel:
             # MATLAB cannot read a field of such a name.

@@ -13,7 +13,7 @@ from mcap.stream_reader import StreamReader
 from mcap.writer import MCAP0_MAGIC
 
 from rigtwin.errors import RigtwinError
-from rigtwin.recording.reader import FileContent, Recording
+from rigtwin.recording.reader import FileContent, RecordedTest
 from rigtwin.recording.records import (
     CHUNK_HEAD,
     DAMAGE,
@@ -98,7 +98,7 @@ class GrowingRecording:
         self.ended = self._content.ended
         return self.latest > before
 
-    def recording(self) -> Recording:
+    def recording(self) -> RecordedTest:
         """Return the window. Raise RigtwinError if there is no recording or no tick yet."""
         return self._content.build(self.path)
 

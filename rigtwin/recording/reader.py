@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Recording:
+class RecordedTest:
     """Recording of one test.
 
     Parameters
@@ -105,7 +105,7 @@ class Recording:
         """All channels as `/topic.field`."""
         return tuple(f"{topic}.{name}" for topic, names in self.columns.items() for name in names)
 
-    def between(self, start: float, stop: float) -> Recording:
+    def between(self, start: float, stop: float) -> RecordedTest:
         """Return the ticks from a time on and before another, in s."""
         # Half a period of tolerance, because recorded times are rounded.
         first, last = np.searchsorted(self.time, np.array([start, stop]) - 0.5 * self.period)
@@ -153,7 +153,7 @@ class Recording:
         return self.inputs.column(topic, name)
 
 
-def load(path: Path) -> Recording:
+def load(path: Path) -> RecordedTest:
     """Read a recording.
 
     Parameters
@@ -259,7 +259,7 @@ class FileContent:
             first = bisect_left(times, round(before * 1e9))
             del times[:first], data[:first]
 
-    def build(self, path: Path) -> Recording:
+    def build(self, path: Path) -> RecordedTest:
         """Return the recording.
 
         Parameters
@@ -301,7 +301,7 @@ class FileContent:
                 "expected the same times on each"
             )
         check_times(path, time, period, notes)
-        return Recording(
+        return RecordedTest(
             path=path,
             machine=printable(about.get("machine", DEFAULT_MACHINE)),
             experiment=printable(about.get("experiment", "")),

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from rigtwin.errors import RigtwinError
 from rigtwin.files import atomic_write, printable
 from rigtwin.numerics.arrays import Array
-from rigtwin.recording import Recording
+from rigtwin.recording import RecordedTest
 from rigtwin.render.style import COLOURS, STYLES, Style
 
 RIG_SENSORS = ("structure_lvdt", "load_cell")
@@ -113,7 +113,7 @@ PANELS = (
 """Panels of the suspension rig from top to bottom. Panels without data are left out."""
 
 
-def _plain_panels(recording: Recording) -> tuple[Panel, ...]:
+def _plain_panels(recording: RecordedTest) -> tuple[Panel, ...]:
     """Return a panel for every channel name of another machine.
 
     A command and a sensor of the same name share a panel.
@@ -133,7 +133,7 @@ def _plain_panels(recording: Recording) -> tuple[Panel, ...]:
     )
 
 
-def find_stretch(recording: Recording, start: float, until: float | None) -> slice:
+def find_stretch(recording: RecordedTest, start: float, until: float | None) -> slice:
     """Return the ticks of a stretch of time.
 
     Parameters
@@ -171,7 +171,7 @@ def find_stretch(recording: Recording, start: float, until: float | None) -> sli
 
 
 def draw(
-    recording: Recording,
+    recording: RecordedTest,
     out: Path,
     start: float = 0.0,
     until: float | None = None,
@@ -204,7 +204,7 @@ def draw(
         save(_figure(recording, ticks, style, panels), out, style.dpi)
 
 
-def _panels(recording: Recording, wanted: Sequence[str]) -> list[tuple[str, list[Trace]]]:
+def _panels(recording: RecordedTest, wanted: Sequence[str]) -> list[tuple[str, list[Trace]]]:
     """Return titles and traces of the panels that the recording has data for."""
     candidates = (
         PANELS
@@ -232,7 +232,7 @@ def _panels(recording: Recording, wanted: Sequence[str]) -> list[tuple[str, list
     return available
 
 
-def _figure(recording: Recording, ticks: slice, style: Style, panels: Sequence[str]) -> Figure:
+def _figure(recording: RecordedTest, ticks: slice, style: Style, panels: Sequence[str]) -> Figure:
     time, shown = recording.time[ticks], _panels(recording, panels)
     left_out = f" · {MOST_PANELS} of {len(shown)} channels" if len(shown) > MOST_PANELS else ""
     shown = shown[:MOST_PANELS]

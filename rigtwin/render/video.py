@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from rigtwin.description.machine import Machine
 from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
-from rigtwin.recording import Recording
+from rigtwin.recording import RecordedTest
 from rigtwin.render.curves import Curve
 from rigtwin.render.plot import find_stretch
 from rigtwin.system import RENDERER
@@ -44,7 +44,7 @@ NO_RENDERING = (
 
 
 def film(
-    recording: Recording,
+    recording: RecordedTest,
     out: Path,
     machine: Machine,
     camera: str | None = None,
@@ -147,7 +147,7 @@ def _add_stream(container: Any) -> Any:
     return stream
 
 
-def _motions(recording: Recording, machine: Machine) -> dict[str, Array]:
+def _motions(recording: RecordedTest, machine: Machine) -> dict[str, Array]:
     """Return the position of each joint at every tick, in m or rad, from the recording alone."""
     machine.physics.require_motion(recording)
     motions = machine.physics.joint_positions(machine, recording.columns, recording.period)

@@ -16,7 +16,7 @@ from rigtwin.description.configuration import Configuration
 from rigtwin.description.control import RigControl
 from rigtwin.diagnosis.residual import Residual, combine_residuals, compute_residual, rounding
 from rigtwin.numerics.arrays import Array
-from rigtwin.recording import Recording
+from rigtwin.recording import RecordedTest
 from rigtwin.rig.component import (
     Output,
     replay_carriage,
@@ -54,7 +54,7 @@ class ComponentReplays:
     Motions are estimated once and shared by all replays. The recording has to pass `data_checks`.
     """
 
-    def __init__(self, recording: Recording, configuration: Configuration) -> None:
+    def __init__(self, recording: RecordedTest, configuration: Configuration) -> None:
         self.recording = recording
         self.configuration = configuration
         self.period = recording.period

@@ -20,7 +20,7 @@ from rigtwin.diagnosis.finding import Level
 from rigtwin.diagnosis.residual import Residual
 from rigtwin.diagnosis.threads import Threads
 from rigtwin.numerics.arrays import Array
-from rigtwin.recording import Recording
+from rigtwin.recording import RecordedTest
 from rigtwin.rig.component_replays import REPLAYS, ComponentReplays, Undetermined
 from rigtwin.signals.noise import spectrum
 from rigtwin.simulation.runner import simulate, without_limits
@@ -106,7 +106,7 @@ def compute_levels(
 
 
 def _component_levels(
-    recording: Recording, before: Configuration, after: Configuration, threads: Threads
+    recording: RecordedTest, before: Configuration, after: Configuration, threads: Threads
 ) -> Callable[[], dict[str, Level]]:
     """Start the replays of all components; return a function that waits for their levels.
 
@@ -138,7 +138,7 @@ def _component_levels(
 
 
 def _closed_loop(
-    recording: Recording,
+    recording: RecordedTest,
     before: Configuration,
     after: Configuration,
     noisy: RigPlant,

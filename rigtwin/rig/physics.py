@@ -15,7 +15,7 @@ from rigtwin.description.physics import Columns, Physics, TwinTest
 from rigtwin.description.settings import Nothing
 from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
-from rigtwin.recording import Inputs, Recording
+from rigtwin.recording import Inputs, RecordedTest
 
 if TYPE_CHECKING:
     from rigtwin.description.mechanism import Mechanism
@@ -113,12 +113,12 @@ class SuspensionRig(Physics):
 
     def simulate(
         self, machine: Machine, name: str, configuration: Configuration, demands: Any, seed: int
-    ) -> Recording:
+    ) -> RecordedTest:
         from rigtwin.rig.simulated import simulate_recording
 
         return simulate_recording(machine.name, name, configuration, demands, seed)
 
-    def excite(self, machine: Machine) -> Iterator[Recording]:
+    def excite(self, machine: Machine) -> Iterator[RecordedTest]:
         from rigtwin.simulation.experiment import find_experiment
 
         for name in machine.next_tests[:1]:
@@ -144,7 +144,7 @@ class SuspensionRig(Physics):
         return compute_levels(evidence, plant, corrected)
 
     def energy_error(
-        self, recording: Recording, configuration: Configuration, known: bool = False
+        self, recording: RecordedTest, configuration: Configuration, known: bool = False
     ) -> EnergyError | None:
         from rigtwin.simulation.energy import measure_energy
 
@@ -163,7 +163,9 @@ class SuspensionRig(Physics):
         )
         return {name: value for name, value in after.items() if value != before[name]}
 
-    def find_compensator(self, recording: Recording, configuration: Configuration) -> Calibration:
+    def find_compensator(
+        self, recording: RecordedTest, configuration: Configuration
+    ) -> Calibration:
         from rigtwin.studies.friction_spikes import find_compensator
 
         return find_compensator(recording, configuration.controller)
@@ -209,17 +211,17 @@ class SuspensionRig(Physics):
 
         return joint_positions(columns, period)
 
-    def require_motion(self, recording: Recording) -> None:
+    def require_motion(self, recording: RecordedTest) -> None:
         for channel in ("structure_lvdt", "suspension_lvdt"):
             recording.column("/sensor", channel)
 
-    def deflection(self, recording: Recording) -> Array | None:
+    def deflection(self, recording: RecordedTest) -> Array | None:
         from rigtwin.simulation.structure_motion import recorded_wing
 
         # A custom controller does not say how its beams bend.
         return None if OWN in recording.controller else recorded_wing(recording)
 
-    def curves(self, machine: Machine, recording: Recording) -> list[Curve]:
+    def curves(self, machine: Machine, recording: RecordedTest) -> list[Curve]:
         from rigtwin.rig.pictures import list_curves
 
         return list_curves(recording)

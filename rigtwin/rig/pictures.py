@@ -7,7 +7,7 @@ from scipy.signal import butter, sosfiltfilt
 
 from rigtwin.description.physics import Columns
 from rigtwin.numerics.arrays import Array
-from rigtwin.recording import Recording
+from rigtwin.recording import RecordedTest
 from rigtwin.render.curves import Curve
 from rigtwin.render.style import COLOURS
 
@@ -30,7 +30,7 @@ def joint_positions(columns: Columns, period: float) -> dict[str, Array]:
     return {"ground": ground, "carriage": structure - travel, "structure": structure}
 
 
-def list_curves(recording: Recording) -> list[Curve]:
+def list_curves(recording: RecordedTest) -> list[Curve]:
     """Return the suspension's force and travel."""
     measured, commanded = COLOURS["measured"], COLOURS["commanded"]
     curves = [

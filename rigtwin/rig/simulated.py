@@ -9,13 +9,13 @@ import numpy as np
 from controllers import Commands, Measurements
 from rigtwin.description.configuration import Configuration, flatten
 from rigtwin.numerics.arrays import Array
-from rigtwin.recording import Recording
+from rigtwin.recording import RecordedTest
 from rigtwin.simulation.runner import simulate, without_limits
 
 
 def simulate_recording(
     machine: str, name: str, configuration: Configuration, demands: Array, seed: int
-) -> Recording:
+) -> RecordedTest:
     """Return the recording that a test would make if no limit ended it.
 
     Parameters
@@ -31,7 +31,7 @@ def simulate_recording(
     """
     ran = simulate(without_limits(configuration), demands, seed)
     period = configuration.timing.period
-    return Recording(
+    return RecordedTest(
         path=Path(name),
         machine=machine,
         experiment=name,

@@ -27,7 +27,7 @@ from rigtwin.description.control import RigControl
 from rigtwin.description.machine import OWN
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
-from rigtwin.recording import Recording
+from rigtwin.recording import RecordedTest
 from rigtwin.signals.band import limit_band
 from rigtwin.signals.noise import remove_mains
 
@@ -82,7 +82,7 @@ class EnergyError:
 
 
 def measure_energy(
-    recording: Recording, configuration: Configuration, foreign: bool = False
+    recording: RecordedTest, configuration: Configuration, foreign: bool = False
 ) -> EnergyError | None:
     """Compute the energy error of a recorded test.
 

@@ -13,7 +13,7 @@ import numpy as np
 from controllers import Commands, Measurements
 from rigtwin.description.configuration import Configuration
 from rigtwin.numerics.arrays import Array
-from rigtwin.recording import Recording
+from rigtwin.recording import RecordedTest
 from rigtwin.signals.noise import rms
 from rigtwin.simulation.ideal import Ideal, simulate_ideal
 from rigtwin.simulation.structure_motion import models_output
@@ -73,7 +73,7 @@ def compute_tracking(
     )
 
 
-def tracking_of(recording: Recording, configuration: Configuration) -> Tracking:
+def tracking_of(recording: RecordedTest, configuration: Configuration) -> Tracking:
     """Compute e1 and e2 of a recorded test.
 
     Parameters

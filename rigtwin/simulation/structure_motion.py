@@ -26,7 +26,7 @@ from rigtwin.description.configuration import Configuration
 from rigtwin.description.control import RigControl, set_up
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
-from rigtwin.recording import Recording
+from rigtwin.recording import RecordedTest
 
 
 @kernel
@@ -115,7 +115,7 @@ def wing(settings: Settings, period: float, packed_states: Array) -> Array:
     return heights - heights[:, :1]
 
 
-def recorded_wing(recording: Recording) -> Array | None:
+def recorded_wing(recording: RecordedTest) -> Array | None:
     """Return `wing` of a recording, or None if its structure model was not a cross of beams."""
     settings = override(Configuration(), {"controller": recording.controller}).controller
     if settings.structure != Structure.BEAM:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from controllers import Compensator, Settings
 from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
-from rigtwin.recording import Recording
+from rigtwin.recording import RecordedTest
 from rigtwin.studies.friction_loop import ForceTest, close_loop, filter_lag
 from rigtwin.studies.reversals import (
     average_rises,
@@ -86,7 +86,7 @@ class Calibration:
         return "\n".join(["[controller]", compensator, *values]) + "\n"
 
 
-def find_compensator(recording: Recording, settings: Settings, seed: int = 0) -> Calibration:
+def find_compensator(recording: RecordedTest, settings: Settings, seed: int = 0) -> Calibration:
     """Identify the compensator's settings from a recording made without compensation.
 
     Parameters
@@ -173,7 +173,7 @@ def _search_settings(base: Settings, test: ForceTest, seed: int) -> Settings:
     return set_values(np.asarray(optimum.x))
 
 
-def _check_recording(recording: Recording, settings: Settings) -> None:
+def _check_recording(recording: RecordedTest, settings: Settings) -> None:
     """Raise RigtwinError unless the recording was made uncompensated and is finite."""
     if settings.compensator != Compensator.NONE:
         state = f"recorded with compensator {settings.compensator.label!r}; expected 'none'"

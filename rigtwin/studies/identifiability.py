@@ -24,7 +24,7 @@ from rigtwin.diagnosis.fit import is_possible, with_values
 from rigtwin.diagnosis.swing import swings
 from rigtwin.models.model import Model
 from rigtwin.numerics.arrays import Array
-from rigtwin.recording import Recording
+from rigtwin.recording import RecordedTest
 
 NO_CHANGE = 1e-7
 """RMS of a change, relative to the signals' own RMS, below which an effect is unobservable."""
@@ -161,7 +161,7 @@ class _Trial:
     Predictions are divided by the RMS of each signal, so that all signals weigh the same.
     """
 
-    def __init__(self, machine: Machine, recordings: Sequence[Recording], until: float) -> None:
+    def __init__(self, machine: Machine, recordings: Sequence[RecordedTest], until: float) -> None:
         """Simulate the motions until a moment, as `time.monotonic` has it."""
         self._machine, self.plant, self._until = machine, machine.plant, until
         self._period = recordings[0].period

@@ -9,7 +9,7 @@ from controllers.force import MOTOR_CONSTANT
 from controllers.friction import MAINS, MOTOR_LAG
 from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
-from rigtwin.recording import Recording
+from rigtwin.recording import RecordedTest
 from rigtwin.studies.friction_loop import filter_lag
 
 SEPARATION = 0.05
@@ -31,7 +31,7 @@ def _without_hum(signal: Array, time: Array) -> Array:
     return signal - waves @ np.linalg.lstsq(waves, signal - signal.mean(), rcond=None)[0]
 
 
-def reversals(recording: Recording) -> tuple[NDArray[np.intp], Array, NDArray[np.intp]]:
+def reversals(recording: RecordedTest) -> tuple[NDArray[np.intp], Array, NDArray[np.intp]]:
     """Locate the reversals of the motor.
 
     Returns
@@ -59,7 +59,7 @@ def reversals(recording: Recording) -> tuple[NDArray[np.intp], Array, NDArray[np
 
 
 def list_complete_reversals(
-    recording: Recording, window: int
+    recording: RecordedTest, window: int
 ) -> tuple[NDArray[np.intp], Array, NDArray[np.intp]]:
     """Return the reversals with a complete window about them, as `reversals` does."""
     turns, directions, crowded = reversals(recording)
@@ -88,7 +88,7 @@ def average_rises(errors: Array, ticks: NDArray[np.intp], directions: Array, win
 
 
 def measure_jumps(
-    recording: Recording, turns: NDArray[np.intp], directions: Array, window: int
+    recording: RecordedTest, turns: NDArray[np.intp], directions: Array, window: int
 ) -> tuple[NDArray[np.intp], float]:
     """Return the tick of the force's jump at each reversal, and the Coulomb force, in N."""
     # Friction = commanded motor force, delayed by the motor's lag, minus the measured force.

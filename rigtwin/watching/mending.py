@@ -8,13 +8,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rigtwin.recording import Recording
+from rigtwin.recording import RecordedTest
 
 LONGEST = 0.05
 """Longest gap that is filled in, in s. During it the machine kept its last commands."""
 
 
-def mend(recording: Recording) -> tuple[Recording, NDArray[np.bool_]]:
+def mend(recording: RecordedTest) -> tuple[RecordedTest, NDArray[np.bool_]]:
     """Fill in missing ticks.
 
     Parameters

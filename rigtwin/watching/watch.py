@@ -13,7 +13,7 @@ from rigtwin.description.machine import Machine
 from rigtwin.diagnosis.data_checks import channels, require_fit
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.errors import RigtwinError
-from rigtwin.recording import Recording
+from rigtwin.recording import RecordedTest
 from rigtwin.signals.noise import white_noise
 from rigtwin.watching.alarm import Alarm
 from rigtwin.watching.cusum import Cusum
@@ -85,7 +85,7 @@ class Watch:
         self.gap: GapTrace | None = None
         self.ratios: dict[str, float] = {}
         self.note, self.judged = "", -math.inf
-        self.recording: Recording | None = None
+        self.recording: RecordedTest | None = None
         self.highest = self.seconds = 0.0
 
     @property
@@ -93,7 +93,7 @@ class Watch:
         """Distance to an alarm: the largest CUSUM in units of its limit."""
         return max((cusum.value for row in self._cusums for cusum in row), default=0.0) / LIMIT
 
-    def take(self, recording: Recording, *, last: bool = False) -> bool:
+    def take(self, recording: RecordedTest, *, last: bool = False) -> bool:
         """Judge what is new of a test.
 
         Parameters
@@ -148,7 +148,7 @@ class Watch:
         self.highest = max(self.highest, self.level)
         return True
 
-    def _require_channels(self, recording: Recording) -> None:
+    def _require_channels(self, recording: RecordedTest) -> None:
         """Raise RigtwinError if the recording is of another machine or lacks a channel."""
         if recording.machine != self.machine.name:
             raise RigtwinError(
@@ -158,7 +158,7 @@ class Watch:
         for topic, name in channels(self.machine):
             recording.column(topic, name)
 
-    def _evidence(self, window: Recording, counts: NDArray[np.bool_]) -> Evidence:
+    def _evidence(self, window: RecordedTest, counts: NDArray[np.bool_]) -> Evidence:
         """Return the evidence of a window; only the given ticks count, once the twin is settled."""
         configuration = self.machine.configuration_of(window, self._base)
         require_fit(self.machine, window, configuration)
@@ -169,7 +169,9 @@ class Watch:
             counted[~self._has_forgotten(window, configuration)] = 0.0
         return Evidence(self.machine, [window], [configuration], [counted])
 
-    def _has_forgotten(self, window: Recording, configuration: Configuration) -> NDArray[np.bool_]:
+    def _has_forgotten(
+        self, window: RecordedTest, configuration: Configuration
+    ) -> NDArray[np.bool_]:
         """Return the ticks whose prediction does not depend on the initial state, shape (ticks,).
 
         The commands at the window's start are changed, and the predictions compared. They never
@@ -218,7 +220,7 @@ class Watch:
                     if self.alarm is None and cusum.value >= LIMIT:
                         self.alarm = Alarm(end, cusum.since, name, BANDS[number])
 
-    def investigate(self, recording: Recording, *, last: bool = False) -> bool:
+    def investigate(self, recording: RecordedTest, *, last: bool = False) -> bool:
         """Search for suspects of an alarm, at once and again as the gap grows.
 
         Parameters
@@ -257,7 +259,7 @@ class Watch:
         return True
 
 
-def _kick(window: Recording, share: float) -> Recording:
+def _kick(window: RecordedTest, share: float) -> RecordedTest:
     """Return a recording whose first commands are enlarged by a share of themselves."""
 
     ticks = round(0.25 * WARM / window.period)

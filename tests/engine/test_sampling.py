@@ -12,7 +12,7 @@ import pytest
 from rigtwin.components import LoadCell, Lvdt, Motor
 from rigtwin.components.computer import Mains
 from rigtwin.diagnosis.sampling import find_outstanding, properties
-from rigtwin.recording import Recording
+from rigtwin.recording import RecordedTest
 from rigtwin.signals.noise import white_noise
 
 PERIOD, TICKS = 1e-3, 8000
@@ -72,7 +72,7 @@ def outstanding(
     for number, name in enumerate(names):
         own = {**NOMINAL, **values.get(name, {})}
         columns[name] = signal(own["white"], own["hum"], own["resolution"], number)
-    recording = Recording(Path("x"), "bench", "", PERIOD, TIME, {"/sensor": columns}, {})
+    recording = RecordedTest(Path("x"), "bench", "", PERIOD, TIME, {"/sensor": columns}, {})
     rows = [SimpleNamespace(name=name, channel=("/sensor", name)) for name in names]
     rows.append(SimpleNamespace(name="drive", channel=("/sensor", names[0])))
     rows.append(SimpleNamespace(name="quiet", channel=("/sensor", names[0])))

@@ -9,7 +9,7 @@ import numpy as np
 
 from rigtwin.description.document import load
 from rigtwin.description.machine import Machine
-from rigtwin.recording import Recording
+from rigtwin.recording import RecordedTest
 
 PERIOD = 2e-3
 LENGTH, MASSES, CENTRES, INERTIAS = 0.4, (2.0, 1.2), (0.2, 0.15), (0.03, 0.012)
@@ -122,7 +122,7 @@ def torques(position: np.ndarray, rate: np.ndarray, acceleration: np.ndarray) ->
     return np.stack([first, second])
 
 
-def recording(position: np.ndarray, torque: np.ndarray, noise: tuple[float, float]) -> Recording:
+def recording(position: np.ndarray, torque: np.ndarray, noise: tuple[float, float]) -> RecordedTest:
     """Of the arm. noise: white, rms, of the angles, rad, and of the torques, Nm."""
     random = np.random.default_rng(5)
     ticks = position.shape[1]
@@ -132,4 +132,4 @@ def recording(position: np.ndarray, torque: np.ndarray, noise: tuple[float, floa
         for joint in range(2)
     }
     time = np.arange(ticks) * PERIOD
-    return Recording(Path("arm"), "arm", "", PERIOD, time, {"/sensor": sensors}, {})
+    return RecordedTest(Path("arm"), "arm", "", PERIOD, time, {"/sensor": sensors}, {})

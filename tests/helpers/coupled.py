@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 
 from rigtwin.description.document import load
 from rigtwin.description.machine import Machine
-from rigtwin.recording import Recording
+from rigtwin.recording import RecordedTest
 from tests.helpers.arm import (
     BELT,
     CENTRES,
@@ -59,11 +59,11 @@ def arm(folder: Path, toml: str = ARM_TOML, mjcf: str = ARM) -> Machine:
     return described(folder, "arm", mjcf, toml)
 
 
-def recording(machine: Machine, columns: dict[str, dict[str, np.ndarray]]) -> Recording:
+def recording(machine: Machine, columns: dict[str, dict[str, np.ndarray]]) -> RecordedTest:
     """Of a machine, by topic and field."""
     ticks = len(next(iter(next(iter(columns.values())).values())))
     time = np.arange(ticks) * PERIOD
-    return Recording(Path("test"), machine.name, "", PERIOD, time, columns, {})
+    return RecordedTest(Path("test"), machine.name, "", PERIOD, time, columns, {})
 
 
 def accelerations(angles: np.ndarray, rates: np.ndarray, torques: np.ndarray) -> np.ndarray:

@@ -8,7 +8,7 @@ import numpy as np
 
 from rigtwin.description.document import load
 from rigtwin.description.machine import Machine
-from rigtwin.recording import Recording
+from rigtwin.recording import RecordedTest
 
 BODIES = {
     "slide": '<joint name="axis" type="slide" axis="1 0 0" stiffness="150" '
@@ -57,10 +57,10 @@ def described(folder: Path, sort: str = "slide", toml: str = TOML) -> Machine:
 
 def recording_of(
     machine: Machine, command: np.ndarray, position: np.ndarray, period: float = 1e-3
-) -> Recording:
+) -> RecordedTest:
     """A recording of it."""
     columns = {"/command": {"force": command}, "/sensor": {"position": position}}
-    return Recording(
+    return RecordedTest(
         Path("bench"), machine.name, "", period, np.arange(len(command)) * period, columns, {}
     )
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from rigtwin.numerics.arrays import Array
-from rigtwin.recording import Recording, load
+from rigtwin.recording import RecordedTest, load
 
 ROOT = Path(__file__).parents[2]
 EXAMPLE = ROOT / "examples" / "nominal-imposed.mcap"
@@ -22,12 +22,12 @@ BESIDE = ROOT.parent / "shared" / "recordings"
 
 
 @cache
-def shipped(name: str) -> Recording:
+def shipped(name: str) -> RecordedTest:
     """A recording that comes with the project."""
     return load(SHIPPED[name])
 
 
-def beside(name: str) -> Recording:
+def beside(name: str) -> RecordedTest:
     """A recording beside the checkout; skips the test where it is absent."""
     path = BESIDE / f"{name}.mcap"
     if not path.exists():
@@ -35,13 +35,13 @@ def beside(name: str) -> Recording:
     return load(path)
 
 
-def rig_recording(name: str) -> Recording:
+def rig_recording(name: str) -> RecordedTest:
     """The one that comes with the project, or else the one beside the checkout; skips the test
     where there is neither."""
     return shipped(name) if name in SHIPPED else beside(name)
 
 
-def beginning(recording: Recording, seconds: float) -> Recording:
+def beginning(recording: RecordedTest, seconds: float) -> RecordedTest:
     """The recording as if it had ended then."""
     ticks = round(seconds / recording.period)
     columns = {
@@ -51,7 +51,7 @@ def beginning(recording: Recording, seconds: float) -> Recording:
     return replace(recording, time=recording.time[:ticks], columns=columns)
 
 
-def replace_sensors(recording: Recording, **sensors: Array) -> Recording:
+def replace_sensors(recording: RecordedTest, **sensors: Array) -> RecordedTest:
     """The recording with other values of these sensors, shape (ticks,) each."""
     return replace(
         recording,

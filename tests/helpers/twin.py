@@ -12,7 +12,7 @@ from rigtwin.description.effects import apply_effects
 from rigtwin.diagnosis.diagnose import diagnose
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.result import Diagnosis
-from rigtwin.recording import Recording
+from rigtwin.recording import RecordedTest
 from rigtwin.rig.simulated import simulate_recording
 
 RIG = machine_of("suspension-rig")
@@ -26,7 +26,7 @@ def rig_effect(name: str) -> Effect:
 @cache
 def recorded(
     name: str, effects: tuple[str, ...] = (), seconds: float = 8.0, seed: int = 5
-) -> Recording:
+) -> RecordedTest:
     """A test on the twin with effects."""
     configuration = EXPERIMENTS[name].configuration
     configuration = configuration._replace(timing=configuration.timing._replace(duration=seconds))
@@ -36,14 +36,14 @@ def recorded(
     )
 
 
-def evidence_of(*recordings: Recording) -> Evidence:
+def evidence_of(*recordings: RecordedTest) -> Evidence:
     return Evidence(RIG, recordings, [RIG.configuration_of(recording) for recording in recordings])
 
 
 def answer(
-    *recordings: Recording,
+    *recordings: RecordedTest,
     base: Configuration | None = None,
-    held_out: tuple[Recording, ...] = (),
+    held_out: tuple[RecordedTest, ...] = (),
 ) -> Diagnosis:
     """What the diagnosis of the suspension rig says of them."""
     return diagnose(RIG, recordings, base, held_out)

@@ -15,7 +15,7 @@ from rigtwin.components import Guide, Servo
 from rigtwin.components.guide_step import guide_step_of
 from rigtwin.description.document import load
 from rigtwin.models.joint_inverse import resist_at_once
-from rigtwin.recording import Recording
+from rigtwin.recording import RecordedTest
 from tests.laws.joints import INTERPRETED, PERIOD, force_to_move, motion_under
 from tests.laws.written import law_of
 
@@ -82,7 +82,7 @@ def test_coupled_joints_count_their_actuators_force(tmp_path: Path):
     machine = load(tmp_path / "two.toml")
     still, push = np.zeros(500), np.full(500, 40.0)
     columns = {"/command": {"push": push}, "/sensor": {"x_one": still, "x_two": still}}
-    recording = Recording(Path("two"), "two", "", PERIOD, TIME, columns, {})
+    recording = RecordedTest(Path("two"), "two", "", PERIOD, TIME, columns, {})
     plant = machine.plant._replace(two=GUIDE)
     model = machine.physics.model(
         machine, recording.inputs, machine.configuration._replace(plant=plant), 2
@@ -118,7 +118,7 @@ def test_coupled_joints_count_the_whole_force_of_their_servo(tmp_path: Path):
     still, command = np.zeros(3000), SPEED * PERIOD * np.arange(3000)
     time = PERIOD * np.arange(3000)
     columns = {"/command": {"push": command}, "/sensor": {"x_one": command, "x_two": still}}
-    recording = Recording(Path("two"), "two", "", PERIOD, time, columns, {})
+    recording = RecordedTest(Path("two"), "two", "", PERIOD, time, columns, {})
     plant = machine.plant._replace(one=GUIDE)
     model = machine.physics.model(
         machine, recording.inputs, machine.configuration._replace(plant=plant), 2

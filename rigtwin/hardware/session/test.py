@@ -28,7 +28,7 @@ from rigtwin.models.commanding import Command, command_by_function
 from rigtwin.models.demands import check_demands, list_wanted
 from rigtwin.models.machine_twin import command_of
 from rigtwin.numerics.arrays import Array
-from rigtwin.recording import Recording
+from rigtwin.recording import RecordedTest
 from rigtwin.simulation.peaks import Peak, peaks
 
 
@@ -120,7 +120,7 @@ class Test:
     def require_limits(self) -> None:
         """Do nothing: the rig always has limits."""
 
-    def predict_peaks(self, recording: Recording) -> tuple[Peak, ...]:
+    def predict_peaks(self, recording: RecordedTest) -> tuple[Peak, ...]:
         """Return how near a session came to every limit."""
         commands, measurements = (
             np.column_stack([recording.column(topic, name) for name in names])
@@ -236,7 +236,7 @@ class MachineTest:
             for name, signal in sorted(self.demands.items())
         )
 
-    def predict_peaks(self, recording: Recording) -> tuple[Peak, ...]:
+    def predict_peaks(self, recording: RecordedTest) -> tuple[Peak, ...]:
         """Return how near a session came to every limit."""
         limited = limited_signals(self.machine, self.configuration, recording.columns)
         return tuple(
