@@ -172,9 +172,17 @@ class _TestSeries:
             worst = max(worst, test.criteria.j2 if test.stable else WORST)
         return worst
 
-    def criterion(self, law: Law) -> float:
-        """Return what the search minimises, %."""
-        return self.worst_tracking(law) + self.noise_response(law)
+    def objective(
+        self, tunable: Tunable, progress: Callable[[int], object]
+    ) -> Callable[[np.ndarray], float]:
+        """Return the function that the search minimises, %, of the logarithms of the parameters."""
+
+        def criterion(point: np.ndarray) -> float:
+            progress(1)
+            law = tunable.make(**tunable.values(point))
+            return self.worst_tracking(law) + self.noise_response(law)
+
+        return criterion
 
     def noise_response(self, law: Law) -> float:
         """Return J2 with noise on the nominal plant, above that of the noise alone, %."""
@@ -272,11 +280,7 @@ def tune_compensator(
     drawn = draw_plants(plants + held_out_plants, seed)
     tuning = _TestSeries(building, ground[: round(TUNED_SECONDS / PERIOD)], drawn[:plants])
     validation = _TestSeries(building, ground, drawn[plants:])
-
-    def objective(point: np.ndarray) -> float:
-        progress(1)
-        return tuning.criterion(tunable.make(**tunable.values(point)))
-
+    objective = tuning.objective(tunable, progress)
     (start, first), (best, last) = _improve(objective, tunable.start(), evaluations)
     values = tunable.values(start), tunable.values(best)
     before, after = (tunable.make(**parameters) for parameters in values)
