@@ -11,7 +11,7 @@ import pytest
 from rigtwin.cli import main
 from rigtwin.components import RigPlant, Scales, Swing, with_parameters
 from rigtwin.components import find as effect_of
-from rigtwin.components.effect import SHARES
+from rigtwin.components.scales import SHARES
 from rigtwin.description.catalogue import find, shipped
 from rigtwin.description.changes import from_assignments, override
 from rigtwin.description.document import examine, load

@@ -37,8 +37,8 @@ WORDS = 15_700
 README_LINES = 120
 NOT_RUN = {
     "cubic_stiffness: Annotated": "a field of a class in rigtwin/components/guide.py",
-    "stretch = position - rest": "lines of a function in rigtwin/components/guide.py",
-    '(\n    Kind(\n        "cubic_stiffness"': "an entry of a tuple in rigtwin/components/guide.py",
+    "stretch = position - rest": "lines of a function in rigtwin/components/guide_force.py",
+    '(\n    Kind(\n        "cubic_stiffness"': "an entry of KINDS in guide_effects.py",
     "from rigtwin.description import physics": "tests/helpers/shaft.py is the whole file, which "
     "tests/test_physics.py runs",
     "from controllers.substructure import Substructured": "needs a client of OpenSees; "

@@ -27,7 +27,7 @@ from rigtwin.components import (
     candidates,
 )
 from rigtwin.components.conditioning import actuator, condition, hold
-from rigtwin.components.guide import breakaway, friction, gap_at
+from rigtwin.components.dry_friction import breakaway, friction, gap_at
 from rigtwin.description.catalogue import find, shipped
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.effects import apply_effects, with_effect

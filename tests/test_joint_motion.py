@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rigtwin.components import Guide, PositionActuator, with_parameters
-from rigtwin.components.guide import dry_limits, friction, slide
+from rigtwin.components.dry_friction import dry_limits, friction, slide
 from rigtwin.components.guide_step import guide_step_of
 from rigtwin.description.catalogue import find
 from rigtwin.description.machine import Machine

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from rigtwin.components.guide import Friction
+from rigtwin.components.dry_friction import Friction
 from rigtwin.models.multibody import Multibody, find_terms
 from rigtwin.numerics.arrays import to_records
 

@@ -7,7 +7,7 @@ import pytest
 
 import rigtwin
 from rigtwin.components import Guide
-from rigtwin.components.guide import curve, curve_points, position_force
+from rigtwin.components.guide_force import curve, curve_points, position_force
 from rigtwin.diagnosis.text import describe
 from tests.helpers.described import NOISY, described
 

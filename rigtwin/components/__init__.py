@@ -8,7 +8,7 @@ from rigtwin.components.actuators import ForceActuator, PositionActuator
 from rigtwin.components.body import Base, Body
 from rigtwin.components.computer import Computer, Mains
 from rigtwin.components.cylinder import Cylinder
-from rigtwin.components.effect import Effect, Kind, Motion, Scales, Starts, Swing
+from rigtwin.components.effect import Effect, Kind, Starts
 from rigtwin.components.gas_spring import GasSpring
 from rigtwin.components.guide import Guide, Rail
 from rigtwin.components.library import KINDS, candidates, find, title
@@ -18,6 +18,7 @@ from rigtwin.components.plant import Plant, component_of, with_parameters
 from rigtwin.components.quantity import UNLIMITED
 from rigtwin.components.rig import RigPlant
 from rigtwin.components.rotor import Rotor
+from rigtwin.components.scales import Motion, Scales, Swing
 from rigtwin.components.schedule import Schedule
 from rigtwin.components.sensors import (
     ForceSensor,

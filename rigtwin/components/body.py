@@ -13,8 +13,9 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from rigtwin.components.effect import Context, Kind, Starts, fixed_starts, shares_of_nominal
+from rigtwin.components.effect import Context, Kind, Starts
 from rigtwin.components.quantity import MJCF, NONE, Quantity
+from rigtwin.components.starts import fixed_starts, shares_of_nominal
 from rigtwin.numerics.arrays import Array
 
 INERTIAL = ("mass", "mx", "my", "mz", "ixx", "iyy", "izz", "ixy", "ixz", "iyz")

@@ -25,8 +25,7 @@ from controllers.compiled import compilable
 from rigtwin.components.actuators import ForceActuator, PositionActuator
 from rigtwin.components.computer import Computer
 from rigtwin.components.cylinder import Cylinder
-from rigtwin.components.effect import Context, Guess, Kind, Starts, at_limits, fixed_starts
-from rigtwin.components.guide import late_or_early_starts, late_starts
+from rigtwin.components.effect import Context, Guess, Kind, Starts
 from rigtwin.components.motor import Motor
 from rigtwin.components.quantity import UNLIMITED
 from rigtwin.components.sensors import (
@@ -38,6 +37,7 @@ from rigtwin.components.sensors import (
     VelocitySensor,
 )
 from rigtwin.components.servo import PUSHERS, Pusher, Servo, VelocityServo
+from rigtwin.components.starts import at_limits, fixed_starts, late_or_early_starts, late_starts
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
 from rigtwin.numerics.delay import delay_sample, ring

@@ -9,113 +9,16 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-import numpy as np
-
 from rigtwin.components.plant import C, Plant, component_of, parameter_of
 from rigtwin.components.quantity import Quantity, fields
-from rigtwin.numerics.arrays import Array
+from rigtwin.components.scales import Scales, Swing
 
-SHARES = (0.9999, 0.999, 0.98, 0.9, 0.75, 0.5, 0.3)
-"""Quantiles of a command's magnitude and rate at which a search for a limit starts."""
-TINY = 1e-12
 Points = tuple[tuple[float, float], ...]
 """Positions and forces of a curve, m and N."""
 NAMES = {"computer": "controller"}
 """Component of the plant → its name in effects, where they differ."""
 GROUPS = {component: group for group, component in NAMES.items()}
 """Name in effects → component of the plant."""
-
-
-@dataclass(frozen=True)
-class Swing:
-    """Magnitude and rate of a command, as quantiles.
-
-    Attributes
-    ----------
-    largest : tuple of float
-        Magnitudes below which the command stays for `SHARES` of the time, in its unit.
-    fastest : tuple of float
-        Rates below which it stays for `SHARES` of the time, unit/s.
-    """
-
-    largest: tuple[float, ...] = (0.0,) * len(SHARES)
-    fastest: tuple[float, ...] = (0.0,) * len(SHARES)
-
-
-@dataclass(frozen=True)
-class Motion:
-    """Motion of a component.
-
-    Attributes
-    ----------
-    position, speed, force : Array
-        Position, m, velocity, m/s, and force, N, shape (ticks,) each.
-    """
-
-    position: Array
-    speed: Array
-    force: Array
-
-
-@dataclass(frozen=True)
-class Scales:
-    """Sizes of a component's motion, by which a search is scaled.
-
-    Attributes
-    ----------
-    stroke : float
-        Half the range of positions, m.
-    span : tuple of float
-        Lowest and highest position, m; as measured, where the position is.
-    speed, acceleration, force : float
-        rms values, m/s, m/s² and N.
-    fastest : float
-        Highest speed, m/s.
-    period : float
-        Time from tick to tick, s.
-    """
-
-    stroke: float
-    span: tuple[float, float]
-    speed: float
-    fastest: float
-    acceleration: float
-    force: float
-    period: float
-
-    @property
-    def time(self) -> float:
-        """Characteristic time of the motion, stroke / speed, s."""
-        return max(self.stroke / self.speed, self.period)
-
-    @classmethod
-    def of(
-        cls, motion: Motion, force: float, period: float, measured: Array | None = None
-    ) -> Scales:
-        """Return the scales of a motion.
-
-        Parameters
-        ----------
-        motion
-            Motion of the component.
-        force
-            rms of the force measured there, N.
-        period
-            Time from tick to tick, s.
-        measured
-            Measured position, m, shape (ticks,), where there is any.
-        """
-        positions = motion.position if measured is None else measured
-        rms = float(np.sqrt(np.mean(motion.force**2)))
-        return cls(
-            stroke=max(0.5 * float(np.ptp(motion.position)), TINY),
-            span=(float(np.min(positions)), float(np.max(positions))),
-            speed=max(float(np.sqrt(np.mean(motion.speed**2))), TINY),
-            fastest=max(float(np.max(np.abs(motion.speed))), TINY),
-            acceleration=max(float(np.std(np.gradient(motion.speed, period))), TINY),
-            force=max(force, rms, TINY),
-            period=period,
-        )
 
 
 @dataclass(frozen=True)
@@ -356,46 +259,3 @@ class Effect:
         guess = self.kind.at[self.of]
         assert guess is not None
         return guess(Context(self, plant, swing, scales_of))
-
-
-def fixed_starts(values: Sequence[float], step: float) -> Guess:
-    """Return a guess of fixed values, whatever the recording."""
-    return lambda _: Starts.single(values, step)
-
-
-def shares_of_nominal(shares: Sequence[float], step: float) -> Guess:
-    """Return a guess of shares of the nominal value."""
-
-    def guess(at: Context) -> Starts:
-        nominal = at.nominal
-        return Starts.single([nominal * share for share in shares], abs(nominal) * step)
-
-    return guess
-
-
-def shares_of_size(size: Callable[[Scales], float], shares: Sequence[float], step: float) -> Guess:
-    """Return a guess of shares of the nominal value, or of the motion's size where that is zero."""
-
-    def guess(at: Context) -> Starts:
-        unit = at.nominal if at.nominal > 0.0 else size(at.scales)
-        return Starts.single([unit * share for share in shares], step * unit)
-
-    return guess
-
-
-def around_nominal(size: Callable[[Scales], float], shares: Sequence[float], step: float) -> Guess:
-    """Return a guess of the nominal value plus shares of the motion's size, within bounds."""
-
-    def guess(at: Context) -> Starts:
-        meaning = at.effect.quantities()[at.effect.kind.parameters[0]]
-        nominal, unit = at.nominal, size(at.scales)
-        values = [min(max(nominal + share * unit, meaning.low), meaning.high) for share in shares]
-        return Starts.single([v for v in dict.fromkeys(values) if v != nominal], step * unit)
-
-    return guess
-
-
-def at_limits(values: Sequence[float], least: float) -> Starts:
-    """Return starts of a limit at these values, none of them below `least`."""
-    tried = tuple(dict.fromkeys(max(value, 1e-3 * max(values), least) for value in values))
-    return Starts.single(tried, 0.004 * max(float(np.median(tried)), least))

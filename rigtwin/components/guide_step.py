@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from rigtwin.components.guide import Friction, Guide, friction
+from rigtwin.components.dry_friction import Friction, friction
+from rigtwin.components.guide import Guide
 
 
 class GuideStep(NamedTuple):

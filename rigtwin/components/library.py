@@ -14,7 +14,7 @@ from rigtwin.components import (
     computer,
     conditioning,
     end_stops,
-    guide,
+    guide_effects,
     mass,
     mount,
     rotor,
@@ -27,7 +27,7 @@ from rigtwin.components.plant import Plant
 from rigtwin.errors import RigtwinError
 
 MODULES = (
-    guide,
+    guide_effects,
     end_stops,
     mount,
     mass,

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
-from rigtwin.components.effect import Kind, shares_of_nominal, shares_of_size
+from rigtwin.components.effect import Kind
 from rigtwin.components.quantity import MJCF, Quantity
+from rigtwin.components.starts import shares_of_nominal, shares_of_size
 
 
 class Carriage(NamedTuple):

@@ -15,17 +15,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from controllers.compiled import compilable
-from rigtwin.components.effect import Kind, around_nominal
-from rigtwin.components.guide import (
-    Guide,
-    curve_size,
-    damping,
-    dry_limits,
-    position_force,
-    quick_damping,
-    slide,
-)
+from rigtwin.components.dry_friction import dry_limits, slide
+from rigtwin.components.effect import Kind
+from rigtwin.components.guide import Guide
+from rigtwin.components.guide_force import curve_size, damping, position_force, quick_damping
 from rigtwin.components.guide_step import GuideStep
+from rigtwin.components.starts import around_nominal
 
 MOST = 60
 """Largest number of search steps. None is needed where only dry friction is nonlinear."""

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
-from rigtwin.components.effect import Kind, around_nominal
+from rigtwin.components.effect import Kind
 from rigtwin.components.quantity import MJCF, Quantity
+from rigtwin.components.starts import around_nominal
 
 
 class Rotor(NamedTuple):

@@ -16,9 +16,10 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from rigtwin.components.effect import Context, Guess, Kind, Scales, Starts
-from rigtwin.components.guide import slide
+from rigtwin.components.dry_friction import slide
+from rigtwin.components.effect import Context, Guess, Kind, Starts
 from rigtwin.components.quantity import NONE, Quantity
+from rigtwin.components.scales import Scales
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
 from rigtwin.numerics.filters import low_pass

@@ -20,9 +20,10 @@ import numpy as np
 
 from controllers.compiled import compilable
 from rigtwin.components.actuators import ForceActuator
-from rigtwin.components.effect import Context, Kind, Starts, shares_of_nominal
+from rigtwin.components.effect import Context, Kind, Starts
 from rigtwin.components.plant import Plant, component_of
 from rigtwin.components.quantity import MJCF, NONE, UNLIMITED, Quantity
+from rigtwin.components.starts import shares_of_nominal
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
 

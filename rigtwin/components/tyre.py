@@ -7,8 +7,9 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from rigtwin.components.effect import Kind, Starts, fixed_starts
+from rigtwin.components.effect import Kind, Starts
 from rigtwin.components.quantity import NONE, Quantity
+from rigtwin.components.starts import fixed_starts
 from rigtwin.numerics.arrays import Array
 
 SCALE = 0.01

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 from rigtwin.components import Effect, Guide
-from rigtwin.components.guide import THROUGH_FRICTION
+from rigtwin.components.guide_effects import THROUGH_FRICTION
 from rigtwin.components.plant import P, Plant, parameter_of, with_parameters
 
 Values = tuple[tuple[float, ...], ...]

@@ -16,9 +16,9 @@ from itertools import product
 import numpy as np
 
 from rigtwin.components import Effect, Guide, Scales, Starts
-from rigtwin.components.effect import Swing
 from rigtwin.components.guide import resists
 from rigtwin.components.plant import Plant, component_of
+from rigtwin.components.scales import Swing
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.fit import Fit, Values, is_possible, with_values
 from rigtwin.diagnosis.gauss_newton import is_sufficient, minimise

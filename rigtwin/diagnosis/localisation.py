@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from rigtwin.components.effect import Motion
+from rigtwin.components.scales import Motion
 from rigtwin.description.machine import Machine
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.finding import Place

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rigtwin.components.effect import Motion
+from rigtwin.components.scales import Motion
 from rigtwin.diagnosis.finding import Finding
 from rigtwin.diagnosis.overlay import COUNTS, LOOKED_AT
 from rigtwin.diagnosis.words import name_part

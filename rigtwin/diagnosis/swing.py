@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from rigtwin.components import Schedule
-from rigtwin.components.effect import SHARES, Swing
+from rigtwin.components.scales import SHARES, Swing
 from rigtwin.description.machine import Machine
 from rigtwin.recording import RecordedTest
 

@@ -11,8 +11,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from rigtwin.components.effect import Motion
 from rigtwin.components.plant import Plant
+from rigtwin.components.scales import Motion
 from rigtwin.components.servo import push, push_law, pusher_of
 from rigtwin.models.basis import Passage, forms
 from rigtwin.models.coupled_joints import CoupledJoints

@@ -23,7 +23,8 @@ import numpy as np
 
 from controllers.compiled import inlined
 from rigtwin.components import Guide
-from rigtwin.components.guide import damping, dry_limits, position_force, quick_damping, slide
+from rigtwin.components.dry_friction import dry_limits, slide
+from rigtwin.components.guide_force import damping, position_force, quick_damping
 from rigtwin.components.guide_step import GuideStep
 from rigtwin.components.mount import MountState, give_way
 from rigtwin.components.servo import pull, push

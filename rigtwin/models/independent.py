@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rigtwin.components.effect import Motion
 from rigtwin.components.plant import Plant
+from rigtwin.components.scales import Motion
 from rigtwin.models.joint import JointModel
 from rigtwin.models.model import Form, Model
 from rigtwin.numerics.arrays import Array

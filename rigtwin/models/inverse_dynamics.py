@@ -21,10 +21,10 @@ from numpy.typing import NDArray
 
 from rigtwin.components import Base, Body, Guide, Rotor, Schedule
 from rigtwin.components.body import list_surplus
-from rigtwin.components.effect import Motion
 from rigtwin.components.guide import acts
 from rigtwin.components.guide_step import guide_step_of
 from rigtwin.components.plant import Plant, component_of, select
+from rigtwin.components.scales import Motion
 from rigtwin.components.schedule import follow, scheduled_force
 from rigtwin.components.sensors import apply_sensor, sensor_of
 from rigtwin.description.machine import Machine, ReplayOf, Row

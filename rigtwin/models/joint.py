@@ -10,8 +10,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from rigtwin.components.effect import Motion
 from rigtwin.components.plant import Plant
+from rigtwin.components.scales import Motion
 from rigtwin.components.sensors import apply_sensor, sensor_of
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Machine, ReplayOf, Row

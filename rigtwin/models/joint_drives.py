@@ -14,8 +14,9 @@ from rigtwin.components import (
     component_of,
 )
 from rigtwin.components.conditioning import actuator, condition_all, hold
+from rigtwin.components.dry_friction import Friction, friction, friction_size
 from rigtwin.components.end_stops import soften_stops
-from rigtwin.components.guide import Friction, acts, friction, friction_size
+from rigtwin.components.guide import acts
 from rigtwin.components.plant import Plant
 from rigtwin.components.sensors import sensor_of
 from rigtwin.components.servo import Push, push_law, pusher_of

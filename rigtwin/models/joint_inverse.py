@@ -6,7 +6,8 @@ Nothing is integrated but the friction elements, whose state follows from the mo
 
 from __future__ import annotations
 
-from rigtwin.components.guide import damping, dry_limits, position_force, quick_damping, slide
+from rigtwin.components.dry_friction import dry_limits, slide
+from rigtwin.components.guide_force import damping, position_force, quick_damping
 from rigtwin.components.guide_step import GuideStep
 from rigtwin.components.mount import MountState, give_way
 from rigtwin.models.joint_motion import Inertia, gravity

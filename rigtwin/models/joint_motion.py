@@ -26,7 +26,7 @@ import numpy as np
 from controllers.compiled import compilable, inlined
 from controllers.formula import Program, run
 from rigtwin.components.conditioning import Actuator, ActuatorState, condition
-from rigtwin.components.guide import damping
+from rigtwin.components.guide_force import damping
 from rigtwin.components.guide_step import GuideStep
 from rigtwin.components.mount import MountState, give_way
 from rigtwin.components.sensors import Transducer, TransducerState, transduce

@@ -14,7 +14,8 @@ from __future__ import annotations
 import math
 
 from controllers.compiled import compilable, inlined
-from rigtwin.components.guide import damping, dry_limits, position_force, quick_damping, slide
+from rigtwin.components.dry_friction import dry_limits, slide
+from rigtwin.components.guide_force import damping, position_force, quick_damping
 from rigtwin.components.guide_step import GuideStep
 from rigtwin.components.servo import Play
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from rigtwin.components import Guide
-from rigtwin.components.guide import friction, friction_size
+from rigtwin.components.dry_friction import friction, friction_size
 from rigtwin.components.sensors import Sensor, remove_drift
 from rigtwin.numerics.arrays import Array
 

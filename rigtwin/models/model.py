@@ -11,8 +11,8 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from rigtwin.components.effect import Motion
 from rigtwin.components.plant import Plant
+from rigtwin.components.scales import Motion
 from rigtwin.numerics.arrays import Array
 
 P = TypeVar("P", bound=Plant, contravariant=True)

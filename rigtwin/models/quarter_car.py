@@ -15,8 +15,8 @@ import numpy as np
 from controllers import Measurements
 from controllers.force import MOTOR_CONSTANT
 from rigtwin.components import Computer, Cylinder, RigPlant
-from rigtwin.components.effect import Motion
 from rigtwin.components.plant import select
+from rigtwin.components.scales import Motion
 from rigtwin.components.sensors import apply_sensor
 from rigtwin.description.configuration import Configuration
 from rigtwin.models.basis import Passage, forms

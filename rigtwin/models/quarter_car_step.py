@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 from controllers.compiled import compilable, inlined
 from rigtwin.components import RigPlant
-from rigtwin.components.guide import breakaway
+from rigtwin.components.dry_friction import breakaway
 from rigtwin.components.yielding import Rod, share_of_load, solve_yielding
 from rigtwin.simulation.plant import RigContacts, stiffness_ratio
 

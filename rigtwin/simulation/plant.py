@@ -25,8 +25,8 @@ from rigtwin.components.cylinder import (
     next_position,
     rest_state,
 )
+from rigtwin.components.dry_friction import Friction, breakaway, friction, gap_at
 from rigtwin.components.gas_spring import spring_force
-from rigtwin.components.guide import Friction, breakaway, friction, gap_at
 from rigtwin.components.tyre import SCALE
 from rigtwin.components.yielding import Rod, share_of_load, solve_yielding
 from rigtwin.numerics.arrays import Array

@@ -17,8 +17,9 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from rigtwin.components import Effect
-from rigtwin.components.effect import Scales, Starts, Swing
+from rigtwin.components.effect import Starts
 from rigtwin.components.plant import Plant
+from rigtwin.components.scales import Scales, Swing
 from rigtwin.description.machine import Machine
 from rigtwin.diagnosis.fit import is_possible, with_values
 from rigtwin.diagnosis.swing import swings

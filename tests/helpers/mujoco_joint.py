@@ -14,14 +14,8 @@ import numpy as np
 
 from rigtwin.components import Guide
 from rigtwin.components.conditioning import actuator, condition, hold
-from rigtwin.components.guide import (
-    damping,
-    dry_limits,
-    friction,
-    position_force,
-    quick_damping,
-    slide,
-)
+from rigtwin.components.dry_friction import dry_limits, friction, slide
+from rigtwin.components.guide_force import damping, position_force, quick_damping
 from rigtwin.components.guide_step import guide_step_of
 from rigtwin.components.mount import MountState, give_way
 from rigtwin.components.plant import Plant

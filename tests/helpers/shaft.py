@@ -13,8 +13,8 @@ import numpy as np
 from scipy.signal import cont2discrete, dlsim
 
 from rigtwin.components import ForceActuator, Guide, Mass, PositionSensor
-from rigtwin.components.effect import Motion
 from rigtwin.components.plant import Plant
+from rigtwin.components.scales import Motion
 from rigtwin.components.sensors import apply_sensor
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Machine, ReplayOf

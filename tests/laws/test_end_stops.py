@@ -9,7 +9,7 @@ import pytest
 
 from rigtwin.components import Guide
 from rigtwin.components.end_stops import soften_stops
-from rigtwin.components.guide import position_force
+from rigtwin.components.guide_force import position_force
 from tests.laws.joints import PERIOD, force_to_move, motion_under
 from tests.laws.written import law_of
 

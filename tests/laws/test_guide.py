@@ -8,18 +8,17 @@ import numpy as np
 import pytest
 
 from rigtwin.components import Guide, Motor, Rail
-from rigtwin.components.guide import (
+from rigtwin.components.dry_friction import (
     breakaway,
-    damping,
     dry_limits,
     friction,
     friction_size,
     gap_at,
-    position_force,
-    resists,
     slide,
     stretch,
 )
+from rigtwin.components.guide import resists
+from rigtwin.components.guide_force import damping, position_force
 from tests.laws.joints import PERIOD, force_to_move, motion_under
 from tests.laws.written import law_of
 

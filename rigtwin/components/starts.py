@@ -1,0 +1,69 @@
+"""Values from which a search for an effect starts, by the scales of the motion."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from rigtwin.components.effect import Context, Guess, Starts
+from rigtwin.components.scales import Scales
+
+
+def fixed_starts(values: Sequence[float], step: float) -> Guess:
+    """Return a guess of fixed values, whatever the recording."""
+    return lambda _: Starts.single(values, step)
+
+
+def shares_of_nominal(shares: Sequence[float], step: float) -> Guess:
+    """Return a guess of shares of the nominal value."""
+
+    def guess(at: Context) -> Starts:
+        nominal = at.nominal
+        return Starts.single([nominal * share for share in shares], abs(nominal) * step)
+
+    return guess
+
+
+def shares_of_size(size: Callable[[Scales], float], shares: Sequence[float], step: float) -> Guess:
+    """Return a guess of shares of the nominal value, or of the motion's size where that is zero."""
+
+    def guess(at: Context) -> Starts:
+        unit = at.nominal if at.nominal > 0.0 else size(at.scales)
+        return Starts.single([unit * share for share in shares], step * unit)
+
+    return guess
+
+
+def around_nominal(size: Callable[[Scales], float], shares: Sequence[float], step: float) -> Guess:
+    """Return a guess of the nominal value plus shares of the motion's size, within bounds."""
+
+    def guess(at: Context) -> Starts:
+        meaning = at.effect.quantities()[at.effect.kind.parameters[0]]
+        nominal, unit = at.nominal, size(at.scales)
+        values = [min(max(nominal + share * unit, meaning.low), meaning.high) for share in shares]
+        return Starts.single([v for v in dict.fromkeys(values) if v != nominal], step * unit)
+
+    return guess
+
+
+def at_limits(values: Sequence[float], least: float) -> Starts:
+    """Return starts of a limit at these values, none of them below `least`."""
+    tried = tuple(dict.fromkeys(max(value, 1e-3 * max(values), least) for value in values))
+    return Starts.single(tried, 0.004 * max(float(np.median(tried)), least))
+
+
+def late_starts(context: Context) -> Starts:
+    """Return starts of a lag or delay: a few ticks, and shares of the motion's own time."""
+    scales = context.scales
+    times = {ticks * scales.period for ticks in (0.5, 2.0, 6.0)} | {
+        share * scales.time for share in (0.012, 0.05, 0.15)
+    }
+    return Starts.single(sorted(times), min(0.001 * scales.time, 0.25 * scales.period))
+
+
+def late_or_early_starts(context: Context) -> Starts:
+    """Return starts of either sign: a negative lag is a force that acts later than recorded."""
+    late = late_starts(context)
+    times = [time for (time,) in late.values]
+    return Starts.single([*(-time for time in times[:3]), *times], late.steps[0])
