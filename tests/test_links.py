@@ -25,6 +25,8 @@ LOAD</body></body></worldbody>
 </mujoco>"""
 LOAD = """<body pos="0 0 -0.24">
 <inertial pos="0 0 0" mass="0.5" diaginertia="2e-4 2e-4 2e-4"/></body>"""
+BULKY = """<body pos="0 0 -0.25">
+<inertial pos="0 0 0" mass="2" diaginertia="0.06 0.06 0.06"/></body>"""
 TORQUES = """<jointactuatorfrc name="tau1" joint="shoulder"/>
 <jointactuatorfrc name="tau2" joint="elbow"/>"""
 
@@ -82,10 +84,10 @@ def test_a_payload_is_found_from_the_commands_of_servos(tmp_path: Path):
     assert payload.parameters["payload_z"].value == pytest.approx(-0.24, rel=0.03)
 
 
-@pytest.mark.slow
-def test_a_heavy_link_and_friction_are_found_from_torques(tmp_path: Path):
-    (tmp_path / "arm.xml").write_text(model(sensors=TORQUES))
-    heavy = mujoco.MjModel.from_xml_string(model(LOAD))
+def diagnose_torques(folder: Path, load: str) -> rigtwin.Diagnosis:
+    """Diagnose the torques of a measured motion with friction, under a load on the last link."""
+    (folder / "arm.xml").write_text(model(sensors=TORQUES))
+    heavy = mujoco.MjModel.from_xml_string(model(load))
     state, random = mujoco.MjData(heavy), np.random.default_rng(4)
     time, motion = swing(8.0, 2)
     speed = np.gradient(motion, time, axis=1)
@@ -98,9 +100,37 @@ def test_a_heavy_link_and_friction_are_found_from_torques(tmp_path: Path):
         torques[:, tick] = state.qfrc_inverse + [0.6, 0.3] * np.sign(speed[:, tick])
     torques += 0.01 * random.standard_normal(torques.shape)
     rows = np.column_stack([time, motion.T, torques.T])
-    log = write(tmp_path / "log.csv", "time,q1,q2,tau1,tau2", rows)
-    answer = rigtwin.diagnose(log, machine=tmp_path / "arm.xml")
+    log = write(folder / "log.csv", "time [s],q1 [rad],q2 [rad],tau1 [Nm],tau2 [Nm]", rows)
+    return rigtwin.diagnose(log, machine=folder / "arm.xml")
+
+
+@pytest.mark.slow
+def test_a_heavy_link_and_friction_are_found_from_torques(tmp_path: Path):
+    answer = diagnose_torques(tmp_path, LOAD)
     found = {str(e.name): next(iter(e.parameters.values())).value for e in answer.effects}
     assert found["coulomb@shoulder"] == pytest.approx(0.6, rel=0.05)
     assert found["coulomb@elbow"] == pytest.approx(0.3, rel=0.05)
     assert found["payload@fore"] == pytest.approx(0.5, rel=0.1)
+
+
+@pytest.mark.slow
+def test_a_load_with_an_inertia_of_its_own_is_no_spring_at_another_joint(tmp_path: Path):
+    answer = diagnose_torques(tmp_path, BULKY)
+    assert {str(effect.name) for effect in answer.effects} == {
+        "coulomb@shoulder",
+        "coulomb@elbow",
+        "payload@fore",
+        "mass@fore",
+    }
+    # Mass and payload together are known by mass, first moment and moment of inertia.
+    fore = answer.corrected.plant.fore
+    place = np.array([0.0, 0.0, -0.12]), np.array([fore.payload_x, fore.payload_y, fore.payload_z])
+    masses = fore.mass, fore.payload
+    assert sum(masses) == pytest.approx(0.8 + 2.0, rel=0.02)
+    levers = [mass * at[2] for mass, at in zip(masses, place, strict=True)]
+    assert sum(levers) == pytest.approx(-(0.8 * 0.12 + 2.0 * 0.25), rel=0.02)
+    inertia = fore.mass / 0.8 * 0.006 + sum(
+        mass * at[2] ** 2 for mass, at in zip(masses, place, strict=True)
+    )
+    expected = 0.006 + 0.8 * 0.12**2 + 0.06 + 2.0 * 0.25**2
+    assert inertia == pytest.approx(expected, rel=0.02)

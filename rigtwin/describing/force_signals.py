@@ -21,6 +21,9 @@ NEAR_GEAR = 2.0
 """Factor within which the ratio of two forces may differ from the gear of the model's actuator."""
 SLOPE_LOW, SLOPE_HIGH = 0.2, 5.0
 """Measured force for each unit of the model's; beyond, its unit or a gear is in doubt."""
+SLOPE_HIGHEST = 25.0
+"""The same where the file states the unit, which is then hardly another. A link may weigh several
+times what the model says, and a torque before a gear would be smaller."""
 SHOWN = 0.5
 """Share of a force that the model must explain for its scale or sign to be judged."""
 MOTIONS = (JointQuantity.POSITION, JointQuantity.VELOCITY)
@@ -232,7 +235,10 @@ def _check_force(log: Log, signal: LogSignal, slope: Slope) -> LogSignal:
     ratio = slope.slope * constant
     # Friction and errors of the model change the slope by less than this; an unknown gear or unit
     # by more.
-    if not stated and not SLOPE_LOW < abs(ratio) < SLOPE_HIGH:
+    is_clear = SLOPE_LOW < abs(ratio) < SLOPE_HIGH
+    has_unit = signal.quantity is JointQuantity.FORCE and not signal.assumed
+    is_possible = is_clear or (has_unit and SLOPE_LOW < abs(ratio) < SLOPE_HIGHEST)
+    if not stated and not is_possible:
         question = ask(
             f"column {signal.column!r} is {abs(ratio):.3g} times the force that the model needs at "
             f"{signal.joint}; is it in another unit, or before a gear?",
@@ -246,4 +252,5 @@ def _check_force(log: Log, signal: LogSignal, slope: Slope) -> LogSignal:
     if ratio < 0.0:
         log.notes.append(f"{signal.key}: the model needs the opposite sign")
         return signal
-    return replace(signal, checked=f"confirmed by inverse dynamics ({ratio:.2g} times the model's)")
+    by = f"{'' if is_clear else 'not '}confirmed by inverse dynamics"
+    return replace(signal, checked=f"{by} ({ratio:.2g} times the model's)")

@@ -316,7 +316,7 @@ def _add_links(
 ) -> None:
     """Add the rigid bodies that joints carry: their masses, and what the last one may hold."""
     for joint in joints:
-        effects = ["mass", "payload"] if joint == joints[-1] else ["mass"]
+        effects = ["mass", "inertia", "payload"] if joint == joints[-1] else ["mass"]
         _add_link(mechanism, joint, effects, tables)
 
 

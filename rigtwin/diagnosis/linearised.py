@@ -58,6 +58,17 @@ class Linearised:
         cuts = np.cumsum(self._sizes)[:-1]
         return tuple(tuple(part.tolist()) for part in np.split(vector, cuts))
 
+    def columns_of(self, subset: Sequence[int]) -> Array:
+        """Return the responses to a step of each parameter of some effects, shape (size, n)."""
+        return self._jacobian[:, np.isin(self._owner, subset)]
+
+    def move(self, subset: Sequence[int], steps: Array) -> Values:
+        """Return the values of some effects, moved by a number of steps each, within bounds."""
+        moves = np.zeros(len(self._values))
+        moves[np.isin(self._owner, subset)] = steps
+        values = self._split(np.clip(self._values + moves * self._steps, *self._bounds))
+        return tuple(values[number] for number in subset)
+
     def leave_out_each(self) -> list[Reduced]:
         """Leave out each effect in turn, and refit the others.
 

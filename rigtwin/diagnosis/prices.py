@@ -45,8 +45,8 @@ CONTAINS_SIMPLER = ("two_lags", "mount", "deadband_asymmetry")
 """Kinds that become a simpler kind at an end of their range."""
 SETTINGS = ("damping_gain",)
 """Kinds that change a number which somebody set, and resemble friction."""
-WEIGHED = ("mass", "inertia")
-"""Kinds that change a mass or a moment of inertia by a factor."""
+WEIGHED = ("mass",)
+"""Kinds that change a mass by a factor."""
 SIMPLER_PARAMETERS = 0.5
 """Number of parameters that a kind containing a simpler one costs in addition."""
 NOMINAL_DISTANCE = 0.25
