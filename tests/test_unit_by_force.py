@@ -53,6 +53,28 @@ def test_forces_tell_rad_from_degrees(tmp_path: Path, unit: str, drift: float):
     assert "by the forces, which are 1 times the model's" in position.assumed[0]
 
 
+@pytest.mark.parametrize(("share", "is_doubted"), [(6.0, False), (60.0, True), (0.05, True)])
+def test_a_stated_unit_is_doubted_only_by_a_very_different_force(
+    tmp_path: Path, share: float, is_doubted: bool
+):
+    motion = shaft_motion()
+    table = np.stack([motion["time"], motion["angle"], share * motion["torque"]], axis=1)
+    log = tmp_path / "log.csv"
+    names = "time [s],angle [rad],torque [Nm]"
+    np.savetxt(log, table, delimiter=",", header=names, comments="")
+    model = write_shaft(tmp_path)
+    if is_doubted:
+        with pytest.raises(RigtwinError, match="is it in another unit"):
+            rigtwin.describe(model, log)
+    else:
+        (torque,) = (
+            signal
+            for signal in rigtwin.describe(model, log).reading.signals
+            if signal.key == "shaft.force"
+        )
+        assert torque.checked == "not confirmed by inverse dynamics (6 times the model's)"
+
+
 def test_a_torque_in_percent_is_a_question(tmp_path: Path):
     motion = shaft_motion()
     log, model = tmp_path / "log.csv", write_shaft(tmp_path)

@@ -31,10 +31,15 @@ class Linearised:
         Fitter of the evidence.
     fit
         Fit about which the residual is linearised.
+
+    Attributes
+    ----------
+    fit
+        The same fit.
     """
 
     def __init__(self, fitter: Fitter, fit: Fit) -> None:
-        self._fitter, self._fit = fitter, fit
+        self._fitter, self.fit = fitter, fit
         self._sizes = [len(effect.kind.parameters) for effect in fit.effects]
         # Number of the effect that each parameter of the flat vector belongs to.
         self._owner = np.repeat(np.arange(len(self._sizes)), self._sizes)
@@ -87,7 +92,7 @@ class Linearised:
         The way back to nominal is long for a limit that is hardly reached, and not linear.
         """
         misfit, effects, _ = reduced
-        known = dict(zip(self._fit.effects, self._fit.values, strict=True))
+        known = dict(zip(self.fit.effects, self.fit.values, strict=True))
         values = tuple(known[effect] for effect in effects)
         plant = with_values(self._fitter.plant, effects, values)
         simulated = self._fitter.space.misfit(self._fitter.evidence.residual(plant))
@@ -101,12 +106,12 @@ class Linearised:
         list of tuples
             Misfit, remaining effects and their values, the largest set first.
         """
-        remaining: Sequence[int] = range(len(self._fit.effects))
+        remaining: Sequence[int] = range(len(self.fit.effects))
         path: list[Reduced] = []
         while len(remaining) > 1 and (fewer := self._leave_out(remaining)):
             path.append(fewer[0])
             effects = set(fewer[0][1])
-            remaining = [n for n in remaining if self._fit.effects[n] in effects]
+            remaining = [n for n in remaining if self.fit.effects[n] in effects]
         return path
 
     def _leave_out(self, remaining: Sequence[int]) -> list[Reduced]:
@@ -114,7 +119,7 @@ class Linearised:
         reduced = []
         for omitted in remaining:
             subset = [number for number in remaining if number != omitted]
-            effects = tuple(self._fit.effects[number] for number in subset)
+            effects = tuple(self.fit.effects[number] for number in subset)
             if is_possible(effects, self._fitter.plant):
                 misfit, values = self._keep_only(subset)
                 reduced.append((misfit, effects, values))
@@ -123,7 +128,7 @@ class Linearised:
     def _keep_only(self, subset: Sequence[int]) -> tuple[float, Values]:
         """Return misfit and values when only a subset of the effects is kept and refitted."""
         move = np.zeros(len(self._values))
-        for number, effect in enumerate(self._fit.effects):
+        for number, effect in enumerate(self.fit.effects):
             if number not in subset:
                 # An effect is absent if its magnitude is nominal; its shape is then irrelevant.
                 first = int(np.nonzero(self._owner == number)[0][0])

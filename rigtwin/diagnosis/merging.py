@@ -10,24 +10,24 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import combinations
 
-import numpy as np
-
 from rigtwin.components import Effect
 from rigtwin.diagnosis.fit import Fit, clashes, is_possible, with_values
 from rigtwin.diagnosis.fitter import Fitter
-from rigtwin.diagnosis.gauss_newton import DAMPING
+from rigtwin.diagnosis.imitation import RESEMBLES, Imitator
 from rigtwin.diagnosis.linearised import Linearised
-from rigtwin.diagnosis.proposals import LARGEST_SHARE, RESEMBLES
 from rigtwin.diagnosis.starts import LATE_BY_TIME, Start
 from rigtwin.diagnosis.threads import Threads
-from rigtwin.numerics.arrays import Array
 
 SUBSTITUTES = 2
 """Number of effects tried in the place of each two."""
 
 
 def start_merged(
-    fitter: Fitter, leader: Fit, candidates: Sequence[Effect], threads: Threads
+    fitter: Fitter,
+    leader: Fit,
+    linearised: Linearised,
+    candidates: Sequence[Effect],
+    threads: Threads,
 ) -> list[Start]:
     """Start a hypothesis with one effect in the place of each two.
 
@@ -37,6 +37,8 @@ def start_merged(
         Fitter of the evidence.
     leader
         Fit whose effects are merged.
+    linearised
+        Its linearised residual.
     candidates
         Candidate effects, all of them screened.
     threads
@@ -48,7 +50,6 @@ def start_merged(
         Effects, and the values from which they are fitted.
     """
     starts: list[Start] = []
-    linearised = Linearised(fitter, leader)
     for pair in combinations(range(len(leader.effects)), 2):
         kept = [number for number in range(len(leader.effects)) if number not in pair]
         effects = tuple(leader.effects[number] for number in kept)
@@ -62,53 +63,16 @@ def start_merged(
         ]
         without = fitter.evidence.residual(with_values(fitter.plant, effects, values))
         missing = without - fitter.residual_at(leader)
-
-        def substitute(
-            candidate: Effect,
-            kept: Sequence[int] = kept,
-            effects: tuple[Effect, ...] = effects,
-            missing: Array = missing,
-        ) -> tuple[float, Start]:
-            cosine, start, moves = _imitate(fitter, leader, candidate, missing, linearised, kept)
-            moved = linearised.move(kept, moves)
-            return cosine, ((*effects, candidate), (*moved, start))
-
+        imitator = Imitator(fitter, leader, linearised, kept, (missing,))
+        imitations = threads.spread(imitator.imitate, possible)
         # `sorted` is stable, so that candidates that resemble alike keep their order.
-        ranked = sorted(threads.spread(substitute, possible), key=lambda item: -item[0])
-        starts += [start for cosine, start in ranked[:SUBSTITUTES] if cosine > RESEMBLES]
+        ranked = sorted(imitations, key=lambda imitation: -imitation.cosine)[:SUBSTITUTES]
+        starts += [
+            ((*effects, close.candidate), (*imitator.place_beside(close), close.start))
+            for close in ranked
+            if close.cosine > RESEMBLES
+        ]
     return starts
-
-
-def _imitate(
-    fitter: Fitter,
-    leader: Fit,
-    candidate: Effect,
-    missing: Array,
-    linearised: Linearised,
-    kept: Sequence[int],
-) -> tuple[float, tuple[float, ...], Array]:
-    """Return how well a candidate and changes of the kept effects imitate a missing response.
-
-    The result is the squared cosine between the candidate's response and the missing one, both
-    free of what the kept effects absorb, the candidate's start, and the moves of the kept effects.
-    """
-    starts, responses = zip(*fitter.responses_beside(candidate, leader), strict=True)
-    shapes = np.stack(responses, axis=1).astype(np.float64)
-    space = fitter.space.without_replaced((candidate,))
-    columns = linearised.columns_of(kept)
-    projected = space.project_out(np.column_stack([columns, shapes, missing]))
-    along_columns, others = projected[:, : columns.shape[1]], projected[:, columns.shape[1] :]
-    normal = along_columns.T @ along_columns
-    normal += np.diag(DAMPING * np.diag(normal) + 1e-12)
-    absorbed = np.linalg.solve(normal, along_columns.T @ others)
-    free = others - along_columns @ absorbed
-    shapes, target = free[:, :-1], free[:, -1]
-    along, power = shapes.T @ target, np.maximum(np.sum(shapes**2, axis=0), 1e-100)
-    cosines = np.maximum(along, 0.0) ** 2 / (power * float(target @ target) + 1e-300)
-    best = int(np.argmax(cosines))
-    share = min(float(along[best] / power[best]), LARGEST_SHARE)
-    (start,) = fitter.scale_start(candidate, starts[best], share)
-    return float(cosines[best]), start, share * absorbed[:, best] - absorbed[:, -1]
 
 
 def start_with_summed_delays(leader: Fit) -> list[Start]:

@@ -20,19 +20,17 @@ from numpy.typing import NDArray
 from rigtwin.components import Effect
 from rigtwin.diagnosis.fit import Fit, Values, clashes, is_possible, leave_one_out, with_values
 from rigtwin.diagnosis.fitter import Fitter
+from rigtwin.diagnosis.imitation import LARGEST_SHARE, RESEMBLES, Imitation, Imitator
+from rigtwin.diagnosis.linearised import Linearised
 from rigtwin.diagnosis.space import Space
 from rigtwin.diagnosis.starts import LATE_BY_TIME
 from rigtwin.diagnosis.threads import Threads
 from rigtwin.numerics.arrays import Array
 
-RESEMBLES = 0.6
-"""Squared cosine of two responses from which one effect is tried in the place of the other."""
 IDENTICAL = 0.99999
 """Cosine of two responses from which they count as identical."""
 ELSEWHERE = 6
 """Rank among the resembling effects up to which the same kind at another component is tried."""
-LARGEST_SHARE = 3.0
-"""Largest share of a simulated response that a linear estimate uses."""
 SMALL_PART = 0.05
 """Share of an effect that is taken away for its local response."""
 LATE = ("lag", "delay", "two_lags", "resonance")
@@ -151,7 +149,12 @@ def choose_distinct(proposals: Sequence[Proposal], count: int) -> list[Proposal]
 
 
 def propose_replacements(
-    fitter: Fitter, fit: Fit, effects: Sequence[Effect], count: int, threads: Threads
+    fitter: Fitter,
+    fit: Fit,
+    linearised: Linearised,
+    effects: Sequence[Effect],
+    count: int,
+    threads: Threads,
 ) -> list[tuple[tuple[Effect, ...], Values]]:
     """Propose replacements of each effect of a fit by those with the most similar response.
 
@@ -163,6 +166,8 @@ def propose_replacements(
         Fitter of the evidence.
     fit
         Fit whose effects are replaced in turn.
+    linearised
+        Its linearised residual.
     effects
         Candidate effects, all of them screened.
     count
@@ -179,16 +184,11 @@ def propose_replacements(
     residual = fitter.residual_at(fit)
     for number, (effect, remaining, values) in enumerate(leave_one_out(fit)):
         without = fitter.evidence.residual(with_values(fitter.plant, remaining, values))
+        # The difference of the two targets is the size of the change: an effect may be imitated as
+        # a whole, or only in small changes about its fitted value.
         targets = (without - residual, _local_response(fitter, fit, number, residual))
-
-        def resemble_either(
-            candidate: Effect, targets: tuple[Array, ...] = targets
-        ) -> tuple[float, Effect, tuple[float, ...]]:
-            # The difference of the two targets is the size of the change: an effect may be imitated
-            # as a whole, or only in small changes about its fitted value.
-            whole, local = (resemble(fitter, fit, candidate, target) for target in targets)
-            return whole if whole[0] >= local[0] else local
-
+        kept = [other for other in range(len(fit.effects)) if other != number]
+        imitator = Imitator(fitter, fit, linearised, kept, targets)
         possible = [
             candidate
             for candidate in effects
@@ -196,8 +196,9 @@ def propose_replacements(
         ]
         compatible = [item for item in possible if not clashes(item, fit.effects)]
         # `sorted` is stable, so that candidates that resemble alike keep their order.
-        scored = sorted(threads.spread(resemble_either, compatible), key=lambda item: -item[0])
-        starts += _choose_replacements(fit, number, scored, count)
+        imitations = threads.spread(imitator.imitate, compatible)
+        ranked = sorted(imitations, key=lambda imitation: -imitation.cosine)
+        starts += _choose_replacements(fit, number, imitator, ranked, count)
         # A candidate that sets a parameter of the replaced effect has no response beside it, so
         # that it is tried unseen.
         exclusive = [
@@ -230,64 +231,28 @@ def _local_response(fitter: Fitter, fit: Fit, number: int, residual: Array) -> A
     return (moved - residual) / SMALL_PART
 
 
-def resemble(
-    fitter: Fitter, fit: Fit, candidate: Effect, response: Array
-) -> tuple[float, Effect, tuple[float, ...]]:
-    """Return how well a candidate's response explains another response, and a start for it.
-
-    Parameters
-    ----------
-    fitter
-        Fitter of the evidence.
-    fit
-        Fit beside which the candidate acts.
-    candidate
-        Screened effect.
-    response
-        Whitened response that the candidate may explain, shape (size,).
-
-    Returns
-    -------
-    tuple
-        Squared cosine of the angle between both responses, 0 where they oppose each other; the
-        candidate; and the values that explain most.
-    """
-    starts, responses = zip(*fitter.responses_beside(candidate, fit), strict=True)
-    # An effect that replaces a tolerance must not be judged beside that tolerance.
-    space = fitter.space.without_replaced((candidate,))
-    both = np.column_stack([np.stack(responses, axis=1).astype(np.float64), response])
-    projected = space.project_out(both)
-    shapes, target = projected[:, :-1], projected[:, -1]
-    along, power = shapes.T @ target, np.maximum(np.sum(shapes**2, axis=0), 1e-100)
-    # The sign is kept until the square is taken: an opposed response has no start that imitates the
-    # other.
-    cosines = np.maximum(along, 0.0) ** 2 / (power * float(target @ target) + 1e-300)
-    best = int(np.argmax(cosines))
-    share = min(float(along[best] / power[best]), LARGEST_SHARE)
-    (start,) = fitter.scale_start(candidate, starts[best], share)
-    return float(cosines[best]), candidate, start
-
-
 def _choose_replacements(
-    fit: Fit,
-    number: int,
-    scored: Sequence[tuple[float, Effect, tuple[float, ...]]],
-    count: int,
+    fit: Fit, number: int, imitator: Imitator, ranked: Sequence[Imitation], count: int
 ) -> list[tuple[tuple[Effect, ...], Values]]:
-    """Choose among candidates, the most similar first, those tried in the place of one effect.
+    """Choose among imitations, the closest first, those tried in the place of one effect.
 
-    Beside the most similar ones, these are the same kind at other components, and other kinds that
-    delay the same signal or one that resembles it: the questions that an engineer would ask first.
+    Beside the closest ones, these are the same kind at other components, and other kinds that delay
+    the same signal or one that resembles it: the questions that an engineer would ask first.
     """
     effect = fit.effects[number]
     starts = []
-    for rank, (cosine, candidate, start) in enumerate(scored):
+    for rank, imitation in enumerate(ranked):
+        candidate = imitation.candidate
         kinds = {candidate.kind.name, effect.kind.name}
-        resembles = rank < count and cosine > RESEMBLES
+        resembles = rank < count and imitation.cosine > RESEMBLES
         elsewhere = rank < ELSEWHERE and candidate.kind.name == effect.kind.name
         late = kinds <= {*LATE} and (candidate.group == effect.group or rank < ELSEWHERE)
         if resembles or elsewhere or late:
-            starts.append(_replace_effect(fit, number, candidate, start))
+            values = list(imitator.place_beside(imitation))
+            values.insert(number, imitation.start)
+            effects = list(fit.effects)
+            effects[number] = candidate
+            starts.append((tuple(effects), tuple(values)))
         if kinds <= {*LATE_BY_TIME} and (late or elsewhere):
             # To first order a lag equals a delay of the same time: 1 / (1 + T s) = exp(-T s) + ...
             starts.append(_replace_effect(fit, number, candidate, fit.values[number]))

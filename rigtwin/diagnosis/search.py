@@ -137,6 +137,7 @@ class HypothesisSearch:
         self._scorer = Scorer(self.fine)
         self._extended: set[frozenset[Effect]] = set()
         self._started: set[Start] = set()
+        self._linearised: Linearised | None = None
         self.screened: list[Screened] = []
 
     @property
@@ -424,11 +425,19 @@ class HypothesisSearch:
     def _vary(self, leader: Fit, count: int) -> None:
         """Fit a hypothesis without each effect, and with each replaced by `count` others."""
         starts = self._leave_out(leader)
-        starts += propose_replacements(self.coarse, leader, self._searched, count, self.threads)
+        starts += propose_replacements(
+            self.coarse, leader, self._linearise(leader), self._searched, count, self.threads
+        )
         starts += start_regular_instead(self.coarse, leader, self._searched)
         starts += start_with_summed_delays(leader)
         starts += start_rescaled(self.coarse.plant, leader, self._searched)
         self._keep(self._refine(starts))
+
+    def _linearise(self, fit: Fit) -> Linearised:
+        """Return the linearised residual of a fit. The latest one is kept."""
+        if self._linearised is None or self._linearised.fit is not fit:
+            self._linearised = Linearised(self.coarse, fit)
+        return self._linearised
 
     def _leave_out(self, fit: Fit) -> list[Start]:
         """Return a hypothesis without each effect that may be worth less than its price."""
@@ -436,7 +445,7 @@ class HypothesisSearch:
             return []
         # An effect that is missed by far more than its price need not be left out in a fit.
         most = fit.misfit + MISSED * 2.0 * self.posterior.prices.ordinary
-        reduced = Linearised(self.coarse, fit).leave_out_each()
+        reduced = self._linearise(fit).leave_out_each()
         return [(rest, values) for misfit, rest, values in reduced if misfit < most]
 
     def _reduce_closest(self) -> None:
@@ -472,7 +481,9 @@ class HypothesisSearch:
 
     def _merge(self, leader: Fit) -> None:
         """Fit a hypothesis with one effect in the place of each two."""
-        starts = start_merged(self.coarse, leader, self._searched, self.threads)
+        starts = start_merged(
+            self.coarse, leader, self._linearise(leader), self._searched, self.threads
+        )
         self._keep(self._refine(starts))
 
     def _refine(self, starts: Sequence[Start]) -> list[Fit]:
