@@ -119,6 +119,9 @@ class Kind:
         force that is linear in all of them.
     constants : tuple of str
         Parameters that a start sets and no fit changes, such as the range of a curve.
+    multiplied : tuple of str
+        Parameters that the magnitude multiplies. Effects that change one of them exclude this one,
+        as both together would be known by their product alone.
     points : callable or None
         Function that returns positions and forces of a curve, m and N, from its parameters.
     """
@@ -132,6 +135,7 @@ class Kind:
     nuisances: tuple[str, ...] = field(default=(), compare=False, repr=False)
     magnitudes: int = field(default=1, compare=False, repr=False)
     constants: tuple[str, ...] = field(default=(), compare=False, repr=False)
+    multiplied: tuple[str, ...] = field(default=(), compare=False, repr=False)
     points: Callable[[Mapping[str, float]], Points] | None = field(
         default=None, compare=False, repr=False
     )

@@ -219,6 +219,7 @@ KINDS = (
         ("gains",),
         "both gains of the servo multiplied by this factor, as by a wrong torque constant",
         dict.fromkeys(SERVOS, shares_of_nominal((0.3, 0.6, 1.6, 3.5), 0.004)),
+        multiplied=("position_gain", "damping_gain"),
     ),
     Kind(
         "position_gain",

@@ -244,7 +244,8 @@ def _add_forces(
         tables[name]["effects"] = PRESCRIBED_FORCE
         _add_rotor(joint, tables)
     _add_tendons(mechanism, joints, tables)
-    _add_links(mechanism, joints, tables)
+    # What the last link holds has an inertia of its own, which measured forces show.
+    _add_links(mechanism, joints, ["mass", "inertia", "payload"], tables)
     return forces
 
 
@@ -283,7 +284,7 @@ def _add_free_joints(
         tables[identifier(joint)]["effects"] = FREE
     # Without a force from an actuator, only ratios of friction and masses to one of the masses can
     # be seen. One known force is enough, since coupled joints pass it on.
-    _add_links(mechanism, joints[1:] if free else joints, tables)
+    _add_links(mechanism, joints[1:] if free else joints, ["mass", "payload"], tables)
 
 
 def _sensor(mechanism: Mechanism, joint: str, measured: str) -> dict[str, Any]:
@@ -312,23 +313,25 @@ def _add_rotor(joint: str, tables: dict[str, dict[str, Any]]) -> None:
 
 
 def _add_links(
-    mechanism: Mechanism, joints: Sequence[str], tables: dict[str, dict[str, Any]]
+    mechanism: Mechanism,
+    joints: Sequence[str],
+    last: Sequence[str],
+    tables: dict[str, dict[str, Any]],
 ) -> None:
-    """Add the rigid bodies that joints carry: their masses, and what the last one may hold."""
+    """Add the rigid bodies that joints carry: their masses, and the effects of the last one."""
     for joint in joints:
-        effects = ["mass", "inertia", "payload"] if joint == joints[-1] else ["mass"]
-        _add_link(mechanism, joint, effects, tables)
+        _add_link(mechanism, joint, last if joint == joints[-1] else ["mass"], tables)
 
 
 def _add_link(
-    mechanism: Mechanism, joint: str, effects: list[str], tables: dict[str, dict[str, Any]]
+    mechanism: Mechanism, joint: str, effects: Sequence[str], tables: dict[str, dict[str, Any]]
 ) -> None:
     """Add the rigid body that a joint moves, if it has a name."""
     body = body_of(mechanism, joint)
     if body:
         name = identifier(body)
         name = f"{name}_body" if name in tables else name
-        tables[name] = {"body": body, "type": "body", "effects": effects}
+        tables[name] = {"body": body, "type": "body", "effects": list(effects)}
 
 
 def _add_mass(mechanism: Mechanism, joint: str, tables: dict[str, dict[str, Any]]) -> None:

@@ -74,7 +74,7 @@ def with_values(plant: P, effects: Sequence[Effect], values: Sequence[Sequence[f
 
 
 def clashes(effect: Effect, effects: Sequence[Effect]) -> bool:
-    """Return whether an effect sets a parameter that one of several effects sets too.
+    """Return whether an effect sets or multiplies a parameter that another effect sets.
 
     Parameters
     ----------
@@ -88,11 +88,19 @@ def clashes(effect: Effect, effects: Sequence[Effect]) -> bool:
     bool
         True if the effect and the hypothesis exclude each other.
     """
+    sets, changes = _changed(effect)
+    for member in effects:
+        if member.group == effect.group:
+            others, changed = _changed(member)
+            if sets & changed or changes & others:
+                return True
+    return False
+
+
+def _changed(effect: Effect) -> tuple[set[str], set[str]]:
+    """Return the parameters that an effect sets, and those that it sets or multiplies."""
     parameters = set(effect.kind.parameters)
-    return any(
-        member.group == effect.group and parameters & set(member.kind.parameters)
-        for member in effects
-    )
+    return parameters, parameters | set(effect.kind.multiplied)
 
 
 def is_possible(effects: Sequence[Effect], plant: Plant) -> bool:
