@@ -3,10 +3,12 @@
 1. Screen: simulate each effect at several values, and note its promise to first order.
 2. Fit the promising effects alone, and the regular ones (friction, mass, stiffness) together.
 3. Extend the best hypotheses by one effect. Replace each of their effects by those that resemble
-   it, and leave each out. Repeat as long as a better hypothesis is found.
+   it while the others adapt themselves, and leave each out. Repeat as long as a better hypothesis
+   is found.
 4. Where a large residual remains, restart from other values and at other components, and search for
    the kinds that were left for later.
-5. Leave effects out of the closest hypothesis and of the best ones, as long as this helps.
+5. Leave effects out of the closest hypothesis and of the best ones, and merge two into one, as long
+   as this helps.
 
 A hypothesis is fitted on coarse evidence: half the integration steps, thinned where the models
 allow it. It is scored on the same ticks with all integration steps.
