@@ -91,8 +91,8 @@ def clashes(effect: Effect, effects: Sequence[Effect]) -> bool:
     sets, changes = _changed(effect)
     for member in effects:
         if member.group == effect.group:
-            others, changed = _changed(member)
-            if sets & changed or changes & others:
+            member_sets, member_changes = _changed(member)
+            if sets & member_changes or changes & member_sets:
                 return True
     return False
 

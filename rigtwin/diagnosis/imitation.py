@@ -43,14 +43,14 @@ class Imitation:
         Effect.
     start
         Values of the effect that imitate the missing response best.
-    kept
+    beside
         Values of the effects that are kept, as they adapt themselves.
     """
 
     cosine: float
     candidate: Effect
     start: tuple[float, ...]
-    kept: Values
+    beside: Values
 
 
 class Imitator:
@@ -64,8 +64,8 @@ class Imitator:
         Fit whose effects are kept in part.
     linearised
         Its linearised residual.
-    kept
-        Numbers of the effects that are kept.
+    replaced
+        Numbers of the effects that are replaced; the others are kept.
     missing
         Whitened responses that are missing; the candidate imitates one of them, shape (size,) each.
     """
@@ -75,13 +75,14 @@ class Imitator:
         fitter: Fitter,
         fit: Fit,
         linearised: Linearised,
-        kept: Sequence[int],
+        replaced: Sequence[int],
         missing: Sequence[Array],
     ) -> None:
-        self._fitter, self._fit, self._linearised, self._kept = fitter, fit, linearised, kept
+        self._fitter, self._fit, self._linearised = fitter, fit, linearised
         self._missing = np.stack(missing, axis=1)
-        self._effects = tuple(fit.effects[number] for number in kept)
-        self._values = tuple(fit.values[number] for number in kept)
+        self._retained = [n for n in range(len(fit.effects)) if n not in replaced]
+        self._effects = tuple(fit.effects[number] for number in self._retained)
+        self._values = tuple(fit.values[number] for number in self._retained)
         self._prepared = self._prepare(fitter.space)
 
     def _prepare(self, space: Space) -> tuple[Array, Array, Array]:
@@ -89,7 +90,7 @@ class Imitator:
 
         All of them are free of what the tolerances absorb.
         """
-        columns = space.project_out(self._linearised.columns_of(self._kept))
+        columns = space.project_out(self._linearised.columns_of(self._retained))
         missing = space.project_out(self._missing)
         absorbed = _regress(columns, missing)
         return columns, absorbed, missing - columns @ absorbed
@@ -109,12 +110,12 @@ class Imitator:
         # The sign is kept until the square is taken: an opposed response has no start that imitates
         # the other.
         cosines = np.maximum(along, 0.0) ** 2 / (np.outer(power, size) + 1e-300)
-        best, which = np.unravel_index(int(np.argmax(cosines)), cosines.shape)
-        share = min(float(along[best, which] / power[best]), LARGEST_SHARE)
+        best, target = np.unravel_index(int(np.argmax(cosines)), cosines.shape)
+        share = min(float(along[best, target] / power[best]), LARGEST_SHARE)
         (start,) = self._fitter.scale_start(candidate, starts[best], share)
-        moves = share * absorbed[:, best] - lacking[:, which]
-        moved = self._linearised.move(self._kept, moves)
-        return Imitation(float(cosines[best, which]), candidate, start, moved)
+        moves = share * absorbed[:, best] - lacking[:, target]
+        moved = self._linearised.move(self._retained, moves)
+        return Imitation(float(cosines[best, target]), candidate, start, moved)
 
     def place_beside(self, imitation: Imitation) -> Values:
         """Return the values of the kept effects from which a fit with the candidate begins.
@@ -128,7 +129,7 @@ class Imitator:
             plant = with_values(self._fitter.plant, effects, (*values, imitation.start))
             return self._fitter.space.misfit(self._fitter.evidence.residual(plant))
 
-        return min((imitation.kept, self._values), key=misfit)
+        return min((imitation.beside, self._values), key=misfit)
 
 
 def _regress(columns: Array, responses: Array) -> Array:

@@ -51,9 +51,8 @@ def start_merged(
     """
     starts: list[Start] = []
     for pair in combinations(range(len(leader.effects)), 2):
-        kept = [number for number in range(len(leader.effects)) if number not in pair]
-        effects = tuple(leader.effects[number] for number in kept)
-        values = tuple(leader.values[number] for number in kept)
+        effects = tuple(e for number, e in enumerate(leader.effects) if number not in pair)
+        values = tuple(v for number, v in enumerate(leader.values) if number not in pair)
         possible = [
             candidate
             for candidate in candidates
@@ -63,7 +62,7 @@ def start_merged(
         ]
         without = fitter.evidence.residual(with_values(fitter.plant, effects, values))
         missing = without - fitter.residual_at(leader)
-        imitator = Imitator(fitter, leader, linearised, kept, (missing,))
+        imitator = Imitator(fitter, leader, linearised, pair, (missing,))
         imitations = threads.spread(imitator.imitate, possible)
         # `sorted` is stable, so that candidates that resemble alike keep their order.
         ranked = sorted(imitations, key=lambda imitation: -imitation.cosine)[:SUBSTITUTES]

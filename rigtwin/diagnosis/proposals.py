@@ -187,8 +187,7 @@ def propose_replacements(
         # The difference of the two targets is the size of the change: an effect may be imitated as
         # a whole, or only in small changes about its fitted value.
         targets = (without - residual, _local_response(fitter, fit, number, residual))
-        kept = [other for other in range(len(fit.effects)) if other != number]
-        imitator = Imitator(fitter, fit, linearised, kept, targets)
+        imitator = Imitator(fitter, fit, linearised, [number], targets)
         possible = [
             candidate
             for candidate in effects
@@ -199,8 +198,7 @@ def propose_replacements(
         imitations = threads.spread(imitator.imitate, compatible)
         ranked = sorted(imitations, key=lambda imitation: -imitation.cosine)
         starts += _choose_replacements(fit, number, imitator, ranked, count)
-        # A candidate that sets a parameter of the replaced effect has no response beside it, so
-        # that it is tried unseen.
+        # A candidate that clashes with the replaced effect has no response beside it: try unseen.
         exclusive = [
             candidate
             for candidate in possible

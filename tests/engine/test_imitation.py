@@ -40,9 +40,10 @@ def imitate(response: Array) -> tuple[Any, Any]:
         scale_start=lambda candidate, start, share: ((share * start[0],),),
     )
     linearised: Any = SimpleNamespace(
-        columns_of=lambda kept: -first[:, None], move=lambda kept, moves: ((53.0 + moves[0],),)
+        columns_of=lambda effects: -first[:, None],
+        move=lambda effects, moves: ((53.0 + moves[0],),),
     )
-    imitator = Imitator(fitter, fit, linearised, [0], (2.0 * second,))
+    imitator = Imitator(fitter, fit, linearised, [1], (2.0 * second,))
     return imitator, imitator.imitate(OTHER)
 
 
@@ -53,8 +54,8 @@ def test_what_the_kept_effect_takes_up_does_not_count_against_the_candidate():
     assert imitation.cosine == pytest.approx(1.0)
     assert imitation.start == pytest.approx((2.0,))
     # 3 N − 2 · 5 N beside 50 N.
-    assert imitation.kept == (pytest.approx((43.0,)),)
-    assert imitator.place_beside(imitation) == imitation.kept
+    assert imitation.beside == (pytest.approx((43.0,)),)
+    assert imitator.place_beside(imitation) == imitation.beside
 
 
 def test_an_opposed_response_imitates_nothing():
