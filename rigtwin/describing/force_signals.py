@@ -22,8 +22,9 @@ NEAR_GEAR = 2.0
 SLOPE_LOW, SLOPE_HIGH = 0.2, 5.0
 """Measured force for each unit of the model's; beyond, its unit or a gear is in doubt."""
 SLOPE_HIGHEST = 25.0
-"""The same where the file states the unit, which is then hardly another. A link may weigh several
-times what the model says, and a torque before a gear would be smaller."""
+"""Measured force for each unit of the model's beyond which even a unit that the file states is in
+doubt. A link may weigh several times what the model says; a torque before a gear would be smaller
+than the model's."""
 SHOWN = 0.5
 """Share of a force that the model must explain for its scale or sign to be judged."""
 MOTIONS = (JointQuantity.POSITION, JointQuantity.VELOCITY)

@@ -32,19 +32,19 @@ LARGEST_SHARE = 3.0
 
 @dataclass(frozen=True)
 class Imitation:
-    """Effect in the place of others.
+    """Result of an imitation.
 
     Attributes
     ----------
     cosine
-        Squared cosine between its response and the one that is missing; 0 where they oppose each
-        other.
+        Squared cosine between the response to the candidate and the one that is missing; 0 where
+        they oppose each other.
     candidate
-        Effect.
+        Effect whose response imitates the missing one.
     start
-        Values of the effect that imitate the missing response best.
+        Values of the candidate that imitate the missing response best.
     beside
-        Values of the effects that are kept, as they adapt themselves.
+        Values of the effects that are kept, adapted to the candidate.
     """
 
     cosine: float
@@ -63,7 +63,7 @@ class Imitator:
     fit
         Fit whose effects are kept in part.
     linearised
-        Its linearised residual.
+        Residual of the fit, linearised in the values of its effects.
     replaced
         Numbers of the effects that are replaced; the others are kept.
     missing
@@ -96,7 +96,7 @@ class Imitator:
         return columns, absorbed, missing - columns @ absorbed
 
     def imitate(self, candidate: Effect) -> Imitation:
-        """Return how well a candidate imitates the missing response, whichever it imitates best."""
+        """Return how well a candidate imitates the missing response that it resembles most."""
         starts, responses = zip(*self._fitter.responses_beside(candidate, self._fit), strict=True)
         # An effect that replaces a tolerance must not be judged beside that tolerance.
         space = self._fitter.space.without_replaced((candidate,))

@@ -35,7 +35,7 @@ class Linearised:
     Attributes
     ----------
     fit
-        The same fit.
+        Fit about which the residual is linearised.
     """
 
     def __init__(self, fitter: Fitter, fit: Fit) -> None:

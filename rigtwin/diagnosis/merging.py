@@ -38,7 +38,7 @@ def start_merged(
     leader
         Fit whose effects are merged.
     linearised
-        Its linearised residual.
+        Residual of the leader, linearised in the values of its effects.
     candidates
         Candidate effects, all of them screened.
     threads

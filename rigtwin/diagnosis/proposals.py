@@ -6,7 +6,7 @@ of what the tolerances absorb. The share s of the response explains the chi-squa
     2 s d'r - s^2 d'd,
 
 which is largest at s = d'r / d'd. An effect is added for what it explains of r. It replaces an
-effect with the response e if the squared cosine (d'e)^2 / (d'd e'e) is large.
+effect whose response it imitates (`imitation`).
 """
 
 from __future__ import annotations
@@ -167,7 +167,7 @@ def propose_replacements(
     fit
         Fit whose effects are replaced in turn.
     linearised
-        Its linearised residual.
+        Residual of the fit, linearised in the values of its effects.
     effects
         Candidate effects, all of them screened.
     count
