@@ -103,7 +103,7 @@ def test_a_copy_counts_once(recordings):
     [
         (["coulomb@elbw"], "did you mean 'coulomb@elbow'"),
         ([], "no effect to fit"),
-        (["coulomb@elbow", "coulomb@elbow"], "sets a parameter that another effect"),
+        (["coulomb@elbow", "coulomb@elbow"], "changes a parameter that another effect"),
         (["backlash@elbow"], "lacks what it acts through"),
     ],
 )

@@ -87,7 +87,7 @@ def test_a_fit_is_the_diagnosis_and_is_saved_as_a_twin(look, machine, recording,
         (lambda look: look.predict({"coulomb@guide": (-1.0,)}), "coulomb = -1; expected 0 to"),
         (lambda look: look.predict({"coulomb@guide": (float("nan"),)}), "coulomb = nan"),
         (lambda look: look.fit([]), "no effect to fit; expected some of"),
-        (lambda look: look.fit(["coulomb@guide"] * 2), "sets a parameter that another effect"),
+        (lambda look: look.fit(["coulomb@guide"] * 2), "changes a parameter that another effect"),
         (lambda look: look.save("/nowhere/twin.toml", {}), "cannot write /nowhere/twin.toml"),
     ],
 )

@@ -54,7 +54,7 @@ def find_effects(machine: Machine, names: Sequence[str]) -> tuple[Effect, ...]:
         effect = find(name, machine.plant)
         if clashes(effect, chosen):
             raise RigtwinError(
-                f"{name} sets a parameter that another effect of {', '.join(names)} sets too"
+                f"{name} changes a parameter that another effect of {', '.join(names)} changes too"
             )
         chosen.append(effect)
     return tuple(chosen)
