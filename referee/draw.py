@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from referee.reference_plant import CELL, LVDT, Array, Truth
 from referee.reference_rig import Law, run_quiet
+from referee.reference_truth import CELL, LVDT, Array, Truth
 
 Random = np.random.Generator
 Change = Callable[[Truth, Law], tuple[Truth, Law]]

@@ -29,8 +29,8 @@ from referee.draw import (
     named_defects,
     summary,
 )
-from referee.reference_plant import Array, Truth
 from referee.reference_rig import Law, run
+from referee.reference_truth import Array, Truth
 from referee.test_signals import PROPOSED, TESTS, draw_demands
 
 SHARES = {"single": 0.45, "null": 0.30, "pair": 0.10, "outside": 0.15}

@@ -17,8 +17,9 @@ from controllers import (
     unpacked,
     update,
 )
-from referee.reference_plant import ReferenceBody, Truth, advance, at_rest, sample, true_values
+from referee.reference_plant import ReferenceBody, advance, at_rest, sample, true_values
 from referee.reference_rig import draw_noise
+from referee.reference_truth import Truth
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.settings import Safety
 from rigtwin.numerics.arrays import Array

@@ -7,7 +7,8 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-from referee.reference_plant import Array, Truth, advance, at_rest, sample
+from referee.reference_plant import advance, at_rest, sample
+from referee.reference_truth import Array, Truth
 
 
 class Law(NamedTuple):

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from referee.reference_plant import Array
 from referee.reference_rig import Law
+from referee.reference_truth import Array
 
 TESTS = ("imposed", "imposed", "imposed", "road10", "road1.6", "drop", "tripped")
 """Tests to draw from. Half of the full-length ones are imposed, and one in seven ends early."""

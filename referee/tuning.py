@@ -18,8 +18,8 @@ from controllers import Settings
 from referee.draw import Defect, draw_tolerated, friction
 from referee.referee import write
 from referee.reference_drive import drive
-from referee.reference_plant import Truth
 from referee.reference_rig import Law, run
+from referee.reference_truth import Truth
 from referee.test_signals import draw_demands
 from rigtwin.console import table
 from rigtwin.description.posterior import Posterior, load_posterior

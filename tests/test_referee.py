@@ -14,8 +14,8 @@ import pytest
 from referee.check import Result
 from referee.draw import MATERIAL, SENSORS, draw_tolerated, draw_unnamed, effect_size, named_defects
 from referee.referee import draw_case, operator, sorts, write
-from referee.reference_plant import Truth
 from referee.reference_rig import Law, run, run_quiet
+from referee.reference_truth import Truth
 from referee.score import misses, rows, table, wilson
 from referee.test_signals import TESTS, draw_demands
 from rigtwin.components import RigPlant, candidates

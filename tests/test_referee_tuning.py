@@ -9,8 +9,8 @@ import pytest
 from experiments import find
 from machines import DEFAULT_MACHINE
 from referee.reference_drive import drive
-from referee.reference_plant import Truth
 from referee.reference_rig import run
+from referee.reference_truth import Truth
 from referee.test_signals import draw_demands
 from referee.tuning import TuningCase, check, draw_rig, text
 from rigtwin.cli import main
