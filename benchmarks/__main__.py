@@ -24,7 +24,8 @@ from rigtwin.description.settings import Safety, Timing
 from rigtwin.diagnosis.diagnose import diagnose
 from rigtwin.numerics.compiling import kernel, step
 from rigtwin.rig.simulated import simulate_recording
-from rigtwin.simulation.loop import BLOCK, run_compiled
+from rigtwin.simulation.compiled_loop import run_compiled
+from rigtwin.simulation.loop import BLOCK
 from rigtwin.simulation.plant import Simulation
 from rigtwin.simulation.runner import record
 from rigtwin.simulation.twin import Twin

@@ -40,7 +40,8 @@ from benchmarks.toolbox import (
     set_joint,
     set_mass,
 )
-from referee.arm_cases import MACHINES, ArmCase, build_arm, record_arm
+from referee.arm_cases import MACHINES, ArmCase
+from referee.arm_recordings import build_arm, record_arm
 from rigtwin.components.library import find
 from rigtwin.description.catalogue import SHIPPED
 from rigtwin.diagnosis.evidence import Evidence, relative_errors

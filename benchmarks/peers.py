@@ -44,7 +44,8 @@ from benchmarks.toolbox import (
     set_constant_force,
     set_joint,
 )
-from referee.arm_cases import MACHINES, PERIOD, ArmCase, draw_arm, record_arm
+from referee.arm_cases import MACHINES, ArmCase, draw_arm
+from referee.arm_recordings import PERIOD, record_arm
 from rigtwin.components import Body, Guide, Rotor
 from rigtwin.diagnosis.evidence import Evidence, relative_errors
 from rigtwin.numerics.arrays import Array

@@ -8,9 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from referee.arm_cases import MACHINES, ArmCase, draw_arm, record_arm
-from referee.score import ScoreRow, names, share_of
-from referee.wild_cases import WildData
+from referee.arm_cases import MACHINES, ArmCase, draw_arm
+from referee.arm_recordings import record_arm
+from referee.score import names
+from referee.score_row import ScoreRow, share_of
+from referee.wild_recordings import WildData
 from referee.withheld import (
     Question,
     Withheld,

@@ -3,93 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
-from referee.reference_rig import Law, run_quiet
+from referee.defect import (
+    SENSORS,
+    Change,
+    Defect,
+    DefectMaker,
+    Random,
+    either_sign,
+    log_uniform,
+    replace_fields,
+    single_defect,
+)
+from referee.reference_rig import Law
 from referee.reference_truth import CELL, LVDT, Array, Truth
-
-Random = np.random.Generator
-Change = Callable[[Truth, Law], tuple[Truth, Law]]
-"""Function that adds a defect to a rig and its controller."""
-SENSORS = ("ground_lvdt", "structure_lvdt", "suspension_lvdt", "load_cell")
-MATERIAL = 1.0
-"""Smallest material defect: rms change of some sensor, in units of its white noise."""
-
-
-@dataclass(frozen=True)
-class Defect:
-    """A defect.
-
-    Attributes
-    ----------
-    kind, component : str
-        Name in the vocabulary of the reports, or one outside it.
-    value, nominal : float
-        Defective and nominal value of the first parameter, as a report would give them.
-    inside : bool
-        Whether the reports know this kind.
-    change : callable
-        Function that adds the defect to a rig and to the controller's true settings.
-    """
-
-    kind: str
-    component: str
-    value: float
-    nominal: float
-    inside: bool
-    change: Change = field(repr=False)
-
-
-DefectMaker = Callable[[], Defect]
-
-
-def _replace_fields(path: str, **values: float) -> Change:
-    """Return a change of fields of the rig, or of its part `path`."""
-
-    def change(truth: Truth, law: Law) -> tuple[Truth, Law]:
-        if not path:
-            return truth._replace(**values), law
-        part = truth._asdict()[path]
-        return truth._replace(**{path: part._replace(**values)}), law
-
-    return change
-
-
-def _log_uniform(random: Random, low: float, high: float) -> float:
-    """Draw a number between two bounds, uniform in its logarithm."""
-    # Sizes span decades: a uniform draw would hardly ever give a small one.
-    return float(np.exp(random.uniform(np.log(low), np.log(high))))
-
-
-def _either_sign(random: Random, low: float, high: float) -> float:
-    """Draw a magnitude as `_log_uniform`, with a random sign."""
-    return _log_uniform(random, low, high) * float(random.choice([-1.0, 1.0]))
-
-
-def _single(
-    kind: str, component: str, nominal: float, path: str, name: str, draw: Callable[[], float]
-) -> DefectMaker:
-    """Return a function that draws a defect of one number.
-
-    Parameters
-    ----------
-    kind, component, nominal
-        Kind, component and nominal value, as in `Defect`.
-    path, name
-        Part of the rig, empty for the rig itself, and its field that takes the value.
-    draw
-        Function that draws the value.
-    """
-
-    def defect() -> Defect:
-        value = draw()
-        change = _replace_fields(path, **{name: value})
-        return Defect(kind, component, value, nominal, True, change)
-
-    return defect
 
 
 def friction(component: str, random: Random) -> list[DefectMaker]:
@@ -99,25 +28,25 @@ def friction(component: str, random: Random) -> list[DefectMaker]:
 
     def coulomb() -> float:
         if random.random() < 0.7:
-            return nominal * (1.0 + _log_uniform(random, 0.15, 1.5))
-        return nominal * (1.0 - _log_uniform(random, 0.2, 0.7))
+            return nominal * (1.0 + log_uniform(random, 0.15, 1.5))
+        return nominal * (1.0 - log_uniform(random, 0.2, 0.7))
 
     def stribeck() -> Defect:
-        value, speed = scale * _log_uniform(random, 10.0, 60.0), _log_uniform(random, 0.004, 0.05)
+        value, speed = scale * log_uniform(random, 10.0, 60.0), log_uniform(random, 0.004, 0.05)
         # Both common forms of the Stribeck curve: exponential and Gaussian.
         shape = float(random.choice([1.0, 2.0]))
-        change = _replace_fields(component, peak=value, peak_speed=speed, peak_shape=shape)
+        change = replace_fields(component, peak=value, peak_speed=speed, peak_shape=shape)
         return Defect("stribeck", component, value, 0.0, True, change)
 
     def single(kind: str, name: str, draw: Callable[[], float], at: float = 0.0) -> DefectMaker:
-        return _single(kind, component, at, component, name, draw)
+        return single_defect(kind, component, at, component, name, draw)
 
     return [
         single("coulomb", "coulomb", coulomb, nominal),
-        single("viscous", "viscous", lambda: scale * _log_uniform(random, 30.0, 500.0)),
+        single("viscous", "viscous", lambda: scale * log_uniform(random, 30.0, 500.0)),
         stribeck,
-        single("asymmetry", "asymmetry", lambda: scale * _either_sign(random, 8.0, 50.0)),
-        single("backlash", "play", lambda: _log_uniform(random, 3e-4, 5e-3)),
+        single("asymmetry", "asymmetry", lambda: scale * either_sign(random, 8.0, 50.0)),
+        single("backlash", "play", lambda: log_uniform(random, 3e-4, 5e-3)),
     ]
 
 
@@ -134,15 +63,15 @@ def _actuator(
     def single(
         kind: str, name: str, draw: Callable[[], float], nominal: float = 0.0, part: str = path
     ) -> DefectMaker:
-        return _single(kind, component, nominal, part, name, draw)
+        return single_defect(kind, component, nominal, part, name, draw)
 
     band = (0.03, 0.3) if motor else (3e-4, 3e-3)
     defects = [
-        single("gain", "gain", lambda: 1.0 + _either_sign(random, 0.02, 0.15), 1.0),
-        single("lag", "lag", lambda: _log_uniform(random, 1e-3, 1.2e-2)),
-        single("delay", "delay", lambda: _log_uniform(random, 1e-3, 1.2e-2)),
+        single("gain", "gain", lambda: 1.0 + either_sign(random, 0.02, 0.15), 1.0),
+        single("lag", "lag", lambda: log_uniform(random, 1e-3, 1.2e-2)),
+        single("delay", "delay", lambda: log_uniform(random, 1e-3, 1.2e-2)),
         single("saturation", "limit", lambda: largest * random.uniform(0.5, 0.85), np.inf),
-        single("deadband", "dead_zone", lambda: _log_uniform(random, *band)),
+        single("deadband", "dead_zone", lambda: log_uniform(random, *band)),
     ]
     if motor:
         rate = single("rate_limit", "rate", lambda: fastest * random.uniform(0.05, 0.5), np.inf)
@@ -157,25 +86,25 @@ def _actuator(
             hydraulic,
         ),
         lambda: _compliance(component, hydraulic, random),
-        single("backlash", "play", lambda: _log_uniform(random, 6e-4, 6e-3), 0.0, hydraulic),
+        single("backlash", "play", lambda: log_uniform(random, 6e-4, 6e-3), 0.0, hydraulic),
     ]
 
 
 def _cogging(component: str, random: Random) -> Defect:
-    value = _log_uniform(random, 2.0, 15.0)
-    change = _replace_fields(
+    value = log_uniform(random, 2.0, 15.0)
+    change = replace_fields(
         "",
         ripple=value,
-        ripple_pitch=_log_uniform(random, 0.012, 0.05),
+        ripple_pitch=log_uniform(random, 0.012, 0.05),
         ripple_phase=random.uniform(-3.0, 3.0),
     )
     return Defect("cogging", component, value, 0.0, True, change)
 
 
 def _compliance(component: str, hydraulic: str, random: Random) -> Defect:
-    value = _log_uniform(random, 2e-7, 3e-6)
+    value = log_uniform(random, 2e-7, 3e-6)
     immediate = random.random() < 0.5
-    yielding = _replace_fields(hydraulic, compliance=value)
+    yielding = replace_fields(hydraulic, compliance=value)
 
     def change(truth: Truth, law: Law) -> tuple[Truth, Law]:
         # A stiff bristle between the carriage and a compliant plate would need much smaller steps,
@@ -192,21 +121,21 @@ def _sensor(component: str, random: Random) -> list[DefectMaker]:
     nominal = CELL if cell else LVDT
 
     def single(kind: str, name: str, draw: Callable[[], float], at: float = 0.0) -> DefectMaker:
-        return _single(kind, component, at, component, name, draw)
+        return single_defect(kind, component, at, component, name, draw)
 
     offset, drift = ((2.0, 20.0), (0.3, 3.0)) if cell else ((2e-4, 3e-3), (3e-5, 3e-4))
     white, bit = nominal.white, nominal.bit
     return [
-        single("gain", "gain", lambda: 1.0 + _either_sign(random, 0.015, 0.1), 1.0),
-        single("offset", "offset", lambda: _either_sign(random, *offset)),
-        single("drift", "drift", lambda: _either_sign(random, *drift)),
-        single("lag", "lag", lambda: _log_uniform(random, 1e-3, 1e-2)),
-        single("delay", "delay", lambda: _log_uniform(random, 1e-3, 1e-2)),
+        single("gain", "gain", lambda: 1.0 + either_sign(random, 0.015, 0.1), 1.0),
+        single("offset", "offset", lambda: either_sign(random, *offset)),
+        single("drift", "drift", lambda: either_sign(random, *drift)),
+        single("lag", "lag", lambda: log_uniform(random, 1e-3, 1e-2)),
+        single("delay", "delay", lambda: log_uniform(random, 1e-3, 1e-2)),
         single(
-            "hum", "mains", lambda: nominal.mains * _log_uniform(random, 4.0, 10.0), nominal.mains
+            "hum", "mains", lambda: nominal.mains * log_uniform(random, 4.0, 10.0), nominal.mains
         ),
-        single("noise", "white", lambda: white * _log_uniform(random, 4.0, 10.0), white),
-        single("quantisation", "bit", lambda: bit * _log_uniform(random, 60.0, 400.0), bit),
+        single("noise", "white", lambda: white * log_uniform(random, 4.0, 10.0), white),
+        single("quantisation", "bit", lambda: bit * log_uniform(random, 60.0, 400.0), bit),
     ]
 
 
@@ -216,19 +145,19 @@ def _rest(random: Random) -> list[DefectMaker]:
     def single(
         kind: str, component: str, nominal: float, name: str, draw: Callable[[], float]
     ) -> DefectMaker:
-        return _single(kind, component, nominal, "", name, draw)
+        return single_defect(kind, component, nominal, "", name, draw)
 
     def mass() -> float:
-        return 34.0 * (1.0 + _either_sign(random, 0.02, 0.25))
+        return 34.0 * (1.0 + either_sign(random, 0.02, 0.25))
 
     def stiffness() -> float:
-        return 50_000.0 * (1.0 + _either_sign(random, 0.04, 0.25))
+        return 50_000.0 * (1.0 + either_sign(random, 0.04, 0.25))
 
     def setting() -> Defect:
         # The recording stores the intended setting; the controller runs with another one.
         name = str(random.choice(["kp", "ki", "kff", "filter_force"]))
         nominal = Law()._asdict()[name]
-        value = nominal * (1.0 + _either_sign(random, 0.1, 0.5))
+        value = nominal * (1.0 + either_sign(random, 0.1, 0.5))
         change = lambda truth, law: (truth, law._replace(**{name: value}))  # noqa: E731
         return Defect(f"setting:{name}", "controller", value, nominal, True, change)
 
@@ -236,10 +165,10 @@ def _rest(random: Random) -> list[DefectMaker]:
     return [
         single("mass", "carriage", 34.0, "mass", mass),
         single("stiffness", "tyre", 50_000.0, "tyre", stiffness),
-        single("damping", "tyre", 0.0, "tyre_damping", lambda: _log_uniform(random, 40.0, 1000.0)),
-        single("hardening", "tyre", 0.0, "tyre_hardening", lambda: _log_uniform(random, 6.0, 80.0)),
-        single("delay", computer, 0.0, late, lambda: _log_uniform(random, 1e-3, 8e-3)),
-        single("missed_ticks", computer, 0.0, "missed", lambda: _log_uniform(random, 0.01, 0.1)),
+        single("damping", "tyre", 0.0, "tyre_damping", lambda: log_uniform(random, 40.0, 1000.0)),
+        single("hardening", "tyre", 0.0, "tyre_hardening", lambda: log_uniform(random, 6.0, 80.0)),
+        single("delay", computer, 0.0, late, lambda: log_uniform(random, 1e-3, 8e-3)),
+        single("missed_ticks", computer, 0.0, "missed", lambda: log_uniform(random, 0.01, 0.1)),
         setting,
     ]
 
@@ -252,43 +181,43 @@ def draw_unnamed(random: Random) -> list[DefectMaker]:
     def unnamed(kind: str, component: str, value: float, change: Change) -> DefectMaker:
         return lambda: Defect(kind, component, value, 0.0, False, change)
 
-    relaxing = _log_uniform(random, 0.15, 0.6)
-    wave = _log_uniform(random, 0.25, 0.8)
-    fading = _either_sign(random, 0.15, 0.5)
-    drag, curvature = _log_uniform(random, 150.0, 1500.0), _either_sign(random, 0.03, 0.15)
-    slowdown = _log_uniform(random, 0.04, 0.2)
-    creep = _either_sign(random, 3e-5, 2e-4)
-    crosstalk = _either_sign(random, 1.0, 6.0)
+    relaxing = log_uniform(random, 0.15, 0.6)
+    wave = log_uniform(random, 0.25, 0.8)
+    fading = either_sign(random, 0.15, 0.5)
+    drag, curvature = log_uniform(random, 150.0, 1500.0), either_sign(random, 0.03, 0.15)
+    slowdown = log_uniform(random, 0.04, 0.2)
+    creep = either_sign(random, 3e-5, 2e-4)
+    crosstalk = either_sign(random, 1.0, 6.0)
     return [
         unnamed(
             "viscoelastic",
             "tyre",
             relaxing,
-            _replace_fields("", relaxing=relaxing, relaxing_time=_log_uniform(random, 0.02, 0.3)),
+            replace_fields("", relaxing=relaxing, relaxing_time=log_uniform(random, 0.02, 0.3)),
         ),
         unnamed(
             "uneven way",
             "rail",
             wave,
-            _replace_fields("rail", wave=wave, wave_length=_log_uniform(random, 0.006, 0.03)),
+            replace_fields("rail", wave=wave, wave_length=log_uniform(random, 0.006, 0.03)),
         ),
-        unnamed("heating", "motor", fading, _replace_fields("voltage", fading=3.0 * fading)),
-        unnamed("quadratic drag", "rail", drag, _replace_fields("rail", drag=drag)),
-        unnamed("bend", any_lvdt, curvature, _replace_fields(any_lvdt, curvature=curvature)),
+        unnamed("heating", "motor", fading, replace_fields("voltage", fading=3.0 * fading)),
+        unnamed("quadratic drag", "rail", drag, replace_fields("rail", drag=drag)),
+        unnamed("bend", any_lvdt, curvature, replace_fields(any_lvdt, curvature=curvature)),
         unnamed(
             "slow valve",
             f"{any_cylinder}_cylinder",
             slowdown,
-            _replace_fields(f"{any_cylinder}_hydraulic", slowdown=slowdown),
+            replace_fields(f"{any_cylinder}_hydraulic", slowdown=slowdown),
         ),
         unnamed(
             "creep",
             f"{any_cylinder}_cylinder",
             creep,
-            _replace_fields(f"{any_cylinder}_hydraulic", creep=creep),
+            replace_fields(f"{any_cylinder}_hydraulic", creep=creep),
         ),
         unnamed(
-            "crosstalk", "load_cell", crosstalk, _replace_fields("load_cell", crosstalk=crosstalk)
+            "crosstalk", "load_cell", crosstalk, replace_fields("load_cell", crosstalk=crosstalk)
         ),
     ]
 
@@ -329,10 +258,10 @@ def draw_tolerated(random: Random) -> Truth:
         mass=vary(34.0, 0.005),
         tyre=vary(50_000.0, 0.01),
         motor_constant=vary(186.0, 0.005),
-        load_lag=_log_uniform(random, 2e-3, 1e-2),
-        bristle=_log_uniform(random, 1e8, 1e9) if random.random() < 0.3 else 0.0,
+        load_lag=log_uniform(random, 2e-3, 1e-2),
+        bristle=log_uniform(random, 1e8, 1e9) if random.random() < 0.3 else 0.0,
     )
-    noise_factor, hum_factor = _log_uniform(random, 0.5, 3.0), random.uniform(0.0, 2.0)
+    noise_factor, hum_factor = log_uniform(random, 0.5, 3.0), random.uniform(0.0, 2.0)
     for name in SENSORS:
         nominal = CELL if name == "load_cell" else LVDT
         offset_limit = 0.5 if name == "load_cell" else 5e-5
@@ -351,34 +280,3 @@ def draw_tolerated(random: Random) -> Truth:
         ground=truth.ground._replace(delay=random.uniform(0.0, 1e-4)),
         structure=truth.structure._replace(delay=random.uniform(0.0, 1e-4)),
     )
-
-
-def effect_size(rig: Truth, law: Law, defect: Defect, commands: Array) -> float:
-    """Return the size of a defect: the largest rms change of a sensor, in units of its white noise.
-
-    Both rigs run under the same commands. Defects without a signal of their own, such as noise,
-    count as infinitely large.
-    """
-    if defect.kind in ("hum", "noise", "quantisation", "missed_ticks") or defect.kind.startswith(
-        "setting"
-    ):
-        return float("inf")
-    defective, true_law = defect.change(rig, law)
-    # Without noise on either side, the difference is the defect's alone.
-    change = run_quiet(defective, true_law, commands) - run_quiet(rig, law, commands)
-    parts = rig._asdict()
-    noise = np.array([parts[name].white for name in SENSORS])
-    return float(np.max(np.sqrt(np.mean(change**2, axis=0)) / noise))
-
-
-def summary(defect: Defect, size: float) -> dict[str, Any]:
-    """Return the entry of a defect in the key."""
-    return {
-        "kind": defect.kind,
-        "component": defect.component,
-        "value": defect.value,
-        "nominal": defect.nominal if np.isfinite(defect.nominal) else None,
-        "inside": defect.inside,
-        "size": size if np.isfinite(size) else None,
-        "material": bool(size >= MATERIAL),
-    }

@@ -20,15 +20,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from mcap.writer import CompressionType, Writer
 
-from referee.draw import (
-    MATERIAL,
-    Defect,
-    draw_tolerated,
-    draw_unnamed,
-    effect_size,
-    named_defects,
-    summary,
-)
+from referee.defect import MATERIAL, Defect, effect_size, summary
+from referee.draw import draw_tolerated, draw_unnamed, named_defects
 from referee.reference_rig import Law, run
 from referee.reference_truth import Array, Truth
 from referee.test_signals import PROPOSED, TESTS, draw_demands

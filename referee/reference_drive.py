@@ -25,7 +25,8 @@ from rigtwin.description.settings import Safety
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
 from rigtwin.simulation.runner import SimulationResult
-from rigtwin.simulation.safety import LimitMemory, Trip, empty_memory_arrays, judge_limits
+from rigtwin.simulation.safety import LimitMemory, empty_memory_arrays, judge_limits
+from rigtwin.simulation.trip import Trip
 
 
 @kernel

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from referee.score import wilson
+from referee.score_row import wilson
 from rigtwin.errors import RigtwinError
 
 BLUE, GREY = "#2a6fa8", "#6b7280"

@@ -6,9 +6,10 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from referee.score import ScoreRow, names, share_of
+from referee.score import names
+from referee.score_row import ScoreRow, share_of
 from referee.servo_cases import DESCRIPTION, NOMINAL, ServoCase, draw_servo, record_servo
-from referee.wild_cases import WildData
+from referee.wild_recordings import WildData
 from referee.withheld import (
     Question,
     Withheld,

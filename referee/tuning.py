@@ -15,7 +15,8 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from controllers import Settings
-from referee.draw import Defect, draw_tolerated, friction
+from referee.defect import Defect
+from referee.draw import draw_tolerated, friction
 from referee.referee import write
 from referee.reference_drive import drive
 from referee.reference_rig import Law, run

@@ -10,8 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from referee.score import ScoreRow, names, share_of
-from referee.wild_cases import MACHINES, WildCase, draw_wild, record_wild
+from referee.score import names
+from referee.score_row import ScoreRow, share_of
+from referee.wild_cases import MACHINES, WildCase, draw_wild
+from referee.wild_recordings import record_wild
 from referee.withheld import Question, Withheld, check_machines, score_lines, seconds_row
 from rigtwin.studies.sweep import Workers
 

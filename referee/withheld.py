@@ -10,8 +10,9 @@ from typing import Any, Generic, TypeVar
 
 import numpy as np
 
-from referee.score import ScoreRow, names
-from referee.wild_cases import WildData
+from referee.score import names
+from referee.score_row import ScoreRow
+from referee.wild_recordings import WildData
 from rigtwin.errors import RigtwinError
 from rigtwin.studies.sweep import Store, Workers, run_jobs
 

@@ -27,16 +27,11 @@ if TYPE_CHECKING:
         diagnose,
         what_changed,
     )
-    from rigtwin.api.card import (
-        ServedCard,
-        TableCheck,
-        check_card,
-        release_card,
-        serve_card,
-        write_table,
-    )
+    from rigtwin.api.card import ServedCard, release_card, serve_card
+    from rigtwin.api.card_check import TableCheck, check_card, write_table
     from rigtwin.api.comparing import Comparison, compare, compare_recordings
     from rigtwin.api.describing import Described, describe
+    from rigtwin.api.dry_run import DryRun, dry_run
     from rigtwin.api.each import Answered, diagnose_each
     from rigtwin.api.energy import EnergyError, energy_error
     from rigtwin.api.faults import Campaign, faults
@@ -70,7 +65,7 @@ if TYPE_CHECKING:
         rths,
         tune_compensator,
     )
-    from rigtwin.api.supervised import DryRun, SessionResult, dry_run, run_on_card, run_on_twin
+    from rigtwin.api.supervised import SessionResult, run_on_card, run_on_twin
     from rigtwin.api.tuning import TuningResult, tune
     from rigtwin.api.twin import Configuration
     from rigtwin.api.watching import Alarm, Suspect, Watch, watch
@@ -173,26 +168,15 @@ _MODULES = {
     "comparing": ("Comparison", "compare", "compare_recordings"),
     "describing": ("Described", "describe"),
     "each": ("Answered", "diagnose_each"),
-    "card": (
-        "ServedCard",
-        "TableCheck",
-        "check_card",
-        "release_card",
-        "serve_card",
-        "write_table",
-    ),
+    "card": ("ServedCard", "release_card", "serve_card"),
+    "card_check": ("TableCheck", "check_card", "write_table"),
+    "dry_run": ("DryRun", "dry_run"),
     "energy": ("EnergyError", "energy_error"),
     "faults": ("Campaign", "faults"),
     "fitting": ("EffectFit", "fit"),
     "look": ("look", "show_live", "show_look"),
     "planning": ("plan_test",),
-    "supervised": (
-        "DryRun",
-        "SessionResult",
-        "dry_run",
-        "run_on_card",
-        "run_on_twin",
-    ),
+    "supervised": ("SessionResult", "run_on_card", "run_on_twin"),
     "session": ("run_session",),
     "tuning": ("TuningResult", "tune"),
     "stability": (

@@ -5,18 +5,17 @@ from __future__ import annotations
 import pytest
 
 from rigtwin.diagnosis.advice import advise
+from rigtwin.diagnosis.answer import Answer
 from rigtwin.diagnosis.finding import (
-    Answer,
     Estimate,
     Finding,
-    Gap,
-    Interval,
     Name,
     NextTest,
     Place,
     Tolerated,
     Unobservable,
 )
+from rigtwin.diagnosis.gap import Gap, Interval
 from rigtwin.diagnosis.text import describe, sentence
 
 

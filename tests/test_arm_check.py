@@ -15,11 +15,9 @@ from referee.arm_cases import (
     NOMINAL,
     ROUND,
     ArmCase,
-    build_arm,
     draw_arm,
-    draw_travel,
-    record_arm,
 )
+from referee.arm_recordings import build_arm, draw_travel, record_arm
 from referee.arm_truth import (
     GRAVITY,
     Arm,

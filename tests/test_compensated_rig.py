@@ -30,7 +30,8 @@ from rigtwin.description.configuration import Configuration
 from rigtwin.description.control import RigControl
 from rigtwin.diagnosis.controller import ControllerReplay
 from rigtwin.errors import RigtwinError
-from rigtwin.simulation.loop import run, run_compiled
+from rigtwin.simulation.compiled_loop import run_compiled
+from rigtwin.simulation.loop import run
 from rigtwin.simulation.twin import Twin
 from rigtwin.studies.stability.compensated import (
     with_cylinder_delay,

@@ -16,7 +16,7 @@ from rigtwin.description.configuration import Configuration
 from rigtwin.description.settings import Timing
 from rigtwin.rig.component import replay_cylinder
 from rigtwin.signals.excitation import schroeder
-from rigtwin.simulation.loop import run_compiled
+from rigtwin.simulation.compiled_loop import run_compiled
 from rigtwin.simulation.twin import Twin
 
 NOMINAL = Cylinder()

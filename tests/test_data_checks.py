@@ -11,8 +11,9 @@ from experiments import EXPERIMENTS
 from rigtwin.components import RigPlant, candidates
 from rigtwin.description.catalogue import find
 from rigtwin.description.settings import Timing
-from rigtwin.diagnosis.data_checks import Fault, find_faults
+from rigtwin.diagnosis.data_checks import find_faults
 from rigtwin.diagnosis.diagnose import diagnose
+from rigtwin.diagnosis.unit_checks import Fault
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import RecordedTest, load
 from rigtwin.simulation.runner import record

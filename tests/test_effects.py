@@ -34,10 +34,12 @@ from rigtwin.description.effects import apply_effects, with_effect
 from rigtwin.description.settings import Timing
 from rigtwin.errors import RigtwinError
 from rigtwin.recording import load
+from rigtwin.simulation.compiled_loop import run_compiled
 from rigtwin.simulation.converters import build_sensing, sample_sensors
-from rigtwin.simulation.loop import run, run_compiled
+from rigtwin.simulation.loop import run
 from rigtwin.simulation.mechanics import build, handles
-from rigtwin.simulation.plant import contacts, drive, touch
+from rigtwin.simulation.plant_forces import drive, touch
+from rigtwin.simulation.rig_contacts import contacts
 from rigtwin.simulation.runner import record
 from rigtwin.simulation.twin import Twin
 from tests.helpers.effects import text

@@ -15,7 +15,7 @@ from rigtwin.description.changes import override
 from rigtwin.description.configuration import Configuration
 from rigtwin.errors import RigtwinError
 from rigtwin.simulation.runner import simulate
-from rigtwin.simulation.safety import Trip
+from rigtwin.simulation.trip import Trip
 from rigtwin.studies.actions import ActionSchedule, Actuators
 from rigtwin.studies.environment import Environment, Reward
 

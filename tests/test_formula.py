@@ -7,7 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from controllers.formula import BLOCKS, FUNCTIONS, PLAIN, formula, run
+from controllers.formula import formula
+from controllers.formula_compiler import BLOCKS, FUNCTIONS, PLAIN
+from controllers.formula_program import run
 
 PERIOD = 1e-3
 TICKS = 400

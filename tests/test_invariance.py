@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from referee.wild_cases import MACHINES, WildData, draw_wild, record_wild
+from referee.wild_cases import MACHINES, draw_wild
+from referee.wild_recordings import WildData, record_wild
 from rigtwin.description.catalogue import find
 from rigtwin.description.machine import Machine
 from rigtwin.diagnosis.diagnose import diagnose

@@ -18,7 +18,7 @@ from rigtwin.models.joint import JointModel
 from rigtwin.models.joint_inverse import inverse_dynamics
 from rigtwin.models.joint_motion import Inertia
 from rigtwin.recording import RecordedTest
-from rigtwin.signals.noise import smooth
+from rigtwin.signals.motion import smooth
 from tests.helpers.described import described, recording_of
 
 PERIOD = 1e-3

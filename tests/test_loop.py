@@ -16,9 +16,10 @@ from rigtwin.description.settings import Timing
 from rigtwin.errors import RigtwinError
 from rigtwin.recording import load
 from rigtwin.signals.excitation import schroeder
-from rigtwin.simulation.loop import Block, run, run_compiled
+from rigtwin.simulation.compiled_loop import run_compiled
+from rigtwin.simulation.loop import Block, run
 from rigtwin.simulation.runner import record
-from rigtwin.simulation.safety import Trip
+from rigtwin.simulation.trip import Trip
 from rigtwin.simulation.twin import Twin
 
 SHORT = Timing(duration=1.0)

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from rigtwin.components.dry_friction import Friction
-from rigtwin.models.multibody import Multibody, find_terms
+from rigtwin.models.bodies import find_terms
+from rigtwin.models.multibody import Multibody
 from rigtwin.numerics.arrays import to_records
 
 ARM = """

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rigtwin.signals.noise import band, estimate_motion, remove_mains, rms, white_noise
+from rigtwin.signals.motion import estimate_motion
+from rigtwin.signals.noise import band, remove_mains, rms, white_noise
 
 TIME = np.arange(20_000) * 1e-3
 

@@ -20,7 +20,8 @@ from benchmarks.toolbox import (
     set_joint,
     set_mass,
 )
-from referee.arm_cases import MACHINES, NOMINAL, ArmCase, draw_travel
+from referee.arm_cases import MACHINES, NOMINAL, ArmCase
+from referee.arm_recordings import draw_travel
 from referee.arm_truth import motor_forces
 
 

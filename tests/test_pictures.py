@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rigtwin.components.library import KINDS
-from rigtwin.diagnosis.figures import thin
+from rigtwin.diagnosis.figure_parts import thin
 from rigtwin.diagnosis.finding import Estimate, Finding, Name
 from rigtwin.diagnosis.overlay import Overlay, overlay
 from rigtwin.diagnosis.picture import Picture

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from rigtwin.diagnosis.blocks import count_independent, find_bands, split_transforms
+from rigtwin.diagnosis.deviance import deviance
 from rigtwin.diagnosis.explain import explain
-from rigtwin.diagnosis.posterior import HypothesisPosterior, deviance
+from rigtwin.diagnosis.posterior import HypothesisPosterior
 from rigtwin.diagnosis.support import Support
 from rigtwin.diagnosis.thresholds import STANDARD
 from tests.helpers.twin import evidence_of, recorded

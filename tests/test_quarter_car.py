@@ -16,8 +16,8 @@ from rigtwin.diagnosis.swing import swings
 from rigtwin.models.quarter_car import Disturbances, QuarterCarModel
 from rigtwin.models.quarter_car_step import motor_friction, solve_velocity
 from rigtwin.recording import RecordedTest
-from rigtwin.simulation.loop import run_compiled
-from rigtwin.simulation.plant import initial_yield
+from rigtwin.simulation.compiled_loop import run_compiled
+from rigtwin.simulation.rig_contacts import initial_yield
 from rigtwin.simulation.twin import Twin
 from tests.helpers.twin import RIG, recorded
 

@@ -12,11 +12,13 @@ import numpy as np
 import pytest
 
 from referee.check import Result
-from referee.draw import MATERIAL, SENSORS, draw_tolerated, draw_unnamed, effect_size, named_defects
+from referee.defect import MATERIAL, SENSORS, effect_size
+from referee.draw import draw_tolerated, draw_unnamed, named_defects
 from referee.referee import draw_case, operator, sorts, write
 from referee.reference_rig import Law, run, run_quiet
 from referee.reference_truth import Truth
-from referee.score import misses, rows, table, wilson
+from referee.score import misses, rows, table
+from referee.score_row import wilson
 from referee.test_signals import TESTS, draw_demands
 from rigtwin.components import RigPlant, candidates
 from rigtwin.diagnosis.controller import ControllerReplay

@@ -18,7 +18,7 @@ from rigtwin.description.catalogue import find as find_machine
 from rigtwin.description.changes import override
 from rigtwin.description.configuration import Configuration
 from rigtwin.simulation.runner import simulate
-from rigtwin.simulation.safety import Trip
+from rigtwin.simulation.trip import Trip
 from rigtwin.studies.sweep import Store
 from rigtwin.studies.sweep.workers import SerialExecutor
 from rigtwin.studies.tuning.bench import Bench

@@ -18,7 +18,8 @@ from rigtwin.description.configuration import Configuration
 from rigtwin.description.posterior import load_posterior
 from rigtwin.diagnosis.calibrated import toml
 from rigtwin.diagnosis.overlay import Overlay
-from rigtwin.diagnosis.report import bars, headlines, html
+from rigtwin.diagnosis.report import headlines, html
+from rigtwin.diagnosis.report_bars import bars
 from rigtwin.diagnosis.result import Diagnosis
 from tests.helpers.browser import BROWSER, looked_at
 from tests.helpers.recordings import replace_sensors

@@ -16,7 +16,8 @@ from experiments.rths.building import CASES, PERIOD, STIFFNESS, frequencies, mov
 from experiments.rths.compensators import COMPENSATORS, find_compensator
 from experiments.rths.criteria import delay, judge
 from experiments.rths.ground_motion import QUAKES, ground_motion
-from experiments.rths.hybrid_test import BENCHMARK, ideal_test, run_test
+from experiments.rths.hybrid_test import ideal_test, run_test
+from experiments.rths.noise import BENCHMARK
 from experiments.rths.study import TABLE_3
 from experiments.rths.tuning import TUNABLE
 from rigtwin.cli import main

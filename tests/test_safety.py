@@ -11,13 +11,12 @@ from controllers import Commands, Measurements
 from rigtwin.description.settings import Safety
 from rigtwin.numerics.compiling import kernel
 from rigtwin.simulation.safety import (
-    Trip,
     empty_memory,
     empty_memory_arrays,
-    explain_trip,
     find_arming_obstacle,
     judge_limits,
 )
+from rigtwin.simulation.trip import Trip, explain_trip
 
 PERIOD = 1e-3
 REST = Measurements(0.0, -0.004, 0.0, 200.0)

@@ -41,7 +41,7 @@ from rigtwin.hardware.session.plan import PlannedTest, parse_plan
 from rigtwin.hardware.session.record import record_in_real_time
 from rigtwin.hardware.session.test import Test
 from rigtwin.recording import load
-from rigtwin.recording.reader import transitions
+from rigtwin.recording.recorded_test import transitions
 from rigtwin.system import monotonic
 from tests.helpers.described import NOISY, described
 

@@ -31,8 +31,8 @@ from rigtwin.hardware.session.stops import stop_requests
 from rigtwin.hardware.session.test import Test
 from rigtwin.hardware.supervisor import COMPLETED, NEXT, Cause, Phase, Supervisor
 from rigtwin.recording import load
-from rigtwin.recording.reader import transitions
-from rigtwin.simulation.safety import Trip
+from rigtwin.recording.recorded_test import transitions
+from rigtwin.simulation.trip import Trip
 
 TABLE = load_table(CARD)
 HERE = [kind for kind in KINDS if kind.place != "process"]

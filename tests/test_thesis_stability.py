@@ -13,7 +13,8 @@ from experiments.thesis import (
     vehicles_stability,
 )
 from experiments.thesis.entry import Entry, count_agreeing
-from experiments.thesis.loci import drawing, of_damping_ratio, of_wheel_mass
+from experiments.thesis.loci import of_damping_ratio, of_wheel_mass
+from experiments.thesis.loci_drawing import drawing
 
 MISPRINTED_LAG = "τ = 0.333 s"
 

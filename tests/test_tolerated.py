@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from referee.arm_cases import MACHINES, draw_arm, record_arm
-from referee.wild_cases import WildData
+from referee.arm_cases import MACHINES, draw_arm
+from referee.arm_recordings import record_arm
+from referee.wild_recordings import WildData
 from referee.withheld import answer_question
 
 

@@ -28,6 +28,7 @@ from rigtwin.simulation.experiment import Experiment
 from rigtwin.studies.sweep import Store
 from rigtwin.studies.sweep.workers import SerialExecutor
 from rigtwin.studies.tuning.bench import Bench, Score, quantile
+from rigtwin.studies.tuning.candidates import Candidate, TuningSearch, bound_of
 from rigtwin.studies.tuning.evaluation import compare, median_interval
 from rigtwin.studies.tuning.measures import MEASURES, Trial
 from rigtwin.studies.tuning.parameter import TuningParameter, values_at
@@ -40,7 +41,7 @@ from rigtwin.studies.tuning.scenario import (
     calibrated_rig,
     draw_scenarios,
 )
-from rigtwin.studies.tuning.search import Candidate, TuningSearch, bound_of, find_best, find_front
+from rigtwin.studies.tuning.search import find_best, find_front
 from rigtwin.studies.tuning.study import Constraint, Study
 from rigtwin.studies.tuning.study_file import parse_study
 from tests.helpers.browser import BROWSER, looked_at

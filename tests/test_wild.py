@@ -9,20 +9,14 @@ from typing import Any
 import numpy as np
 import pytest
 
+from referee.friction_truth import ElasticTruth, FrictionTruth
+from referee.imposed_truth import imposed_force
 from referee.reliability import draw_reliability
+from referee.sensor_truth import SensorTruth, read_sensor
 from referee.wild import SURE, WildResult, judge_names, reliability, wild_rows, wild_table
-from referee.wild_cases import ACCEPTED, MACHINES, ROUND, SORTS, WildCase, draw_wild, record_wild
-from referee.wild_truth import (
-    FINE,
-    ElasticTruth,
-    FollowerTruth,
-    FrictionTruth,
-    SensorTruth,
-    drive_pendulum,
-    follow_command,
-    imposed_force,
-    read_sensor,
-)
+from referee.wild_cases import ACCEPTED, MACHINES, ROUND, SORTS, WildCase, draw_wild
+from referee.wild_recordings import record_wild
+from referee.wild_truth import FINE, FollowerTruth, drive_pendulum, follow_command
 from rigtwin.description.catalogue import find
 from rigtwin.diagnosis.data_checks import find_faults
 from rigtwin.errors import RigtwinError

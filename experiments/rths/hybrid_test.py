@@ -27,6 +27,7 @@ from experiments.rths.building import (
     whole_building,
 )
 from experiments.rths.criteria import Criteria, judge
+from experiments.rths.noise import NONE, Noise, draw_noise
 from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
@@ -37,33 +38,12 @@ STEP = 2.0 * VOLTS / 2**BITS
 """Quantisation step of a converter, V."""
 METRES, NEWTONS = 7.89e-3, 1096.0
 """Position, m, and force, N, that one volt stands for."""
-HELD = 2e-4
-"""Time for which a value of the noise is held, s."""
 MOST_FORCE, MOST_MOTION, MOST_SPEED = 8900.0, 7e-3, 0.3
 """Limits of the actuator: force, N, displacement, m, and speed, m/s."""
 DIVERGED = 1.0
 """Displacement beyond which the loop counts as diverged and the test ends, m."""
 Law = LinearLaw | AdaptiveLaw
 """Compensator: a linear law of constant coefficients, or an adaptive one."""
-
-
-@dataclass(frozen=True)
-class Noise:
-    """White noise of the converters.
-
-    Attributes
-    ----------
-    position, force : float
-        Noise of the position and of the force channel, V rms.
-    """
-
-    position: float
-    force: float
-
-
-BENCHMARK = Noise(2e-3, 2e-3)
-"""Noise of the benchmark's problem statement."""
-NONE = Noise(0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -176,7 +156,7 @@ def _simulate(
         # The actuator's states are scaled; position and force are scaled back by these.
         1.0 / UNITS,
         ground,
-        _draw(noise, len(ground), seed),
+        draw_noise(noise, len(ground), seed),
         linear,
         adaptive,
         adaptive_memory(adaptive),
@@ -227,16 +207,6 @@ def _split_law(law: Law) -> tuple[LinearLaw, AdaptiveLaw]:
     if isinstance(law, AdaptiveLaw):
         return pass_through(), law
     return law, adaptive_model([1.0, 0.0], PERIOD)
-
-
-def _draw(noise: Noise, ticks: int, seed: int) -> Array:
-    """Return the noise of position and force, V, shape (2, ticks), each value held for `HELD`."""
-    # An independent random stream: noise and plants do not share random numbers.
-    random = np.random.default_rng([seed, 3])
-    # The noise of the real converters is band-limited: one value holds for `HELD`.
-    index = (np.arange(ticks) * PERIOD / HELD).astype(int)
-    drawn = random.standard_normal((2, int(index[-1]) + 1))
-    return drawn[:, index] * np.array([[noise.position], [noise.force]])
 
 
 @compilable

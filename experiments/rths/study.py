@@ -18,7 +18,6 @@ from experiments.rths.compensators import COMPENSATORS, find_compensator
 from experiments.rths.criteria import Criteria
 from experiments.rths.ground_motion import QUAKES, ground_motion
 from experiments.rths.hybrid_test import (
-    BENCHMARK,
     METRES,
     MOST_FORCE,
     MOST_MOTION,
@@ -26,6 +25,7 @@ from experiments.rths.hybrid_test import (
     ideal_test,
     run_test,
 )
+from experiments.rths.noise import BENCHMARK
 from experiments.thesis.entry import Entry, number, statement
 from experiments.thesis.study import Conclusion, Job, Result, ThesisStudy
 

@@ -23,7 +23,8 @@ from experiments.rths.actuator import ActuatorPlant, draw_plants
 from experiments.rths.building import PERIOD, BuildingCase, find_case
 from experiments.rths.compensators import KALMAN, SMITH, nominal_actuator, nominal_inverse
 from experiments.rths.ground_motion import ground_motion
-from experiments.rths.hybrid_test import BENCHMARK, METRES, Law, run_test
+from experiments.rths.hybrid_test import METRES, Law, run_test
+from experiments.rths.noise import BENCHMARK
 from rigtwin.errors import RigtwinError
 
 Array = np.ndarray

@@ -12,7 +12,7 @@ from controllers import Settings
 from controllers.beam import BEAMS, HEAVE, all_modes, modes
 from experiments.thesis.ride import SHOWN_SEED
 from experiments.thesis.study import Drawing, Result, sheet
-from rigtwin.render.plot import SENSED
+from rigtwin.render.panels import SENSED
 from rigtwin.render.style import COLOURS
 
 

@@ -21,7 +21,7 @@ from experiments.thesis.trial import over_seeds, seeded, trial
 from rigtwin.description.configuration import Configuration
 from rigtwin.simulation.ideal import simulate_ideal
 from rigtwin.simulation.runner import simulate
-from rigtwin.simulation.safety import Trip
+from rigtwin.simulation.trip import Trip
 
 WITHIN = 1.5  # factor within which a computed value agrees with a printed one
 TABLE_7_5 = {"bent passive": "0.679", "semi-active": "0.256", "active": "0.227"}

@@ -9,7 +9,7 @@ import numpy as np
 from controllers.friction import MOTOR_LAG
 from experiments.thesis.study import Drawing, Result, sheet, trace
 from rigtwin.numerics.arrays import Array
-from rigtwin.render.plot import ASKED, SENSED
+from rigtwin.render.panels import ASKED, SENSED
 from rigtwin.render.style import COLOURS
 
 IN_TIME, LATE = 0.9e-3, 15e-3

@@ -27,7 +27,7 @@ from experiments.thesis.entry import Entry, factor, statement
 from experiments.thesis.study import Conclusion, Drawing, Job, Result, ThesisStudy, sheet, span
 from experiments.thesis.trial import seeded
 from rigtwin.numerics.arrays import Array
-from rigtwin.render.plot import ASKED, SENSED
+from rigtwin.render.panels import ASKED, SENSED
 
 HIGHEST = 10
 """Highest frequency of the comparisons, Hz. The tests of chapters 6 and 7 excite none above it."""

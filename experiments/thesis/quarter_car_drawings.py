@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 
 from experiments.thesis.study import Drawing, Result, sheet, trace
 from rigtwin.numerics.arrays import Array
-from rigtwin.render.plot import ASKED, SENSED
+from rigtwin.render.panels import ASKED, SENSED
 from rigtwin.render.style import COLOURS
 
 IDEAL = COLOURS["other"]

@@ -23,7 +23,7 @@ from experiments.thesis.trial import (
     over_seeds,
 )
 from rigtwin.numerics.arrays import Array
-from rigtwin.render.plot import ASKED, SENSED
+from rigtwin.render.panels import ASKED, SENSED
 from rigtwin.render.style import COLOURS
 from rigtwin.signals.noise import rms
 from rigtwin.simulation.structure_motion import states, wing

@@ -13,7 +13,8 @@ import numpy as np
 from experiments.thesis import appendix_a1, appendix_a2, appendix_a3
 from experiments.thesis.appendix_a import FILTER_LAG, PRINTED_LAG, TYRES, WHEELS
 from experiments.thesis.entry import Entry, digits, statement
-from experiments.thesis.loci import ARBITRARY, LocusVariation, damping, drawing, of_damping_ratio
+from experiments.thesis.loci import ARBITRARY, LocusVariation, damping, of_damping_ratio
+from experiments.thesis.loci_drawing import drawing
 from experiments.thesis.study import Conclusion, Result, ThesisStudy, span
 from rigtwin.studies.stability.critical import critical_lag
 from rigtwin.studies.stability.loop import LOOPS

@@ -9,7 +9,8 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from experiments.thesis.entry import Entry, digits
-from experiments.thesis.loci import ARBITRARY, damping, drawing
+from experiments.thesis.loci import ARBITRARY, damping
+from experiments.thesis.loci_drawing import drawing
 from experiments.thesis.single_mass_formulas import FILTER, MASS, SOFT, bode, formulas, region
 from experiments.thesis.single_mass_loci import CASES
 from experiments.thesis.study import Conclusion, Result, ThesisStudy, span

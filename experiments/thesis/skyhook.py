@@ -22,7 +22,7 @@ from experiments.thesis.study import (
     trace,
 )
 from experiments.thesis.trial import over_seeds, seeded, trial, vehicle
-from rigtwin.render.plot import ASKED, SENSED
+from rigtwin.render.panels import ASKED, SENSED
 from rigtwin.render.style import COLOURS
 
 WITHIN = 1.5  # factor within which a computed value agrees with a printed one

@@ -18,7 +18,7 @@ from rigtwin.signals.noise import rms
 from rigtwin.simulation.ideal import Ideal, simulate_ideal
 from rigtwin.simulation.metrics import compute_tracking
 from rigtwin.simulation.runner import SimulationResult, simulate
-from rigtwin.simulation.safety import Trip, explain_trip
+from rigtwin.simulation.trip import Trip, explain_trip
 
 BODY = 3.0
 """Highest frequency counted in the acceleration of the body, Hz.

@@ -20,7 +20,7 @@ from experiments.thesis.study import (
     trace,
 )
 from experiments.thesis.trial import ThesisTrial, curves, errors, over_seeds, seeded, trial
-from rigtwin.render.plot import ASKED, SENSED
+from rigtwin.render.panels import ASKED, SENSED
 from rigtwin.render.style import COLOURS
 
 IDEAL = COLOURS["other"]

@@ -11,8 +11,9 @@ from experiments.rths.actuator import draw_plants
 from experiments.rths.building import find_case
 from experiments.rths.compensators import find_compensator
 from experiments.rths.ground_motion import ground_motion
-from experiments.rths.hybrid_test import NONE, Noise, run_test
 from experiments.rths.hybrid_test import HybridTest as HybridTest
+from experiments.rths.hybrid_test import run_test
+from experiments.rths.noise import NONE, Noise
 from experiments.rths.tuning import TunedCompensator as TunedCompensator
 from experiments.rths.tuning import tune_compensator as tune_compensator
 from experiments.thesis.result import Reproduction

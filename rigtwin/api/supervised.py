@@ -8,27 +8,22 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from datetime import date
 from pathlib import Path
 
 from machines import DEFAULT_MACHINE
 from rigtwin.api.planning import plan_test
-from rigtwin.api.recordings import Recording, load
 from rigtwin.api.twin import Effects, Settings
 from rigtwin.description.machine import Machine
 from rigtwin.errors import RigtwinError
 from rigtwin.files import recordable
-from rigtwin.hardware.daq import CARD
 from rigtwin.hardware.daq.wired import InRealTime, WiredTwin
 from rigtwin.hardware.session.custom_controller import ControllerFactory
-from rigtwin.hardware.session.dry_run import add_dry_run
-from rigtwin.hardware.session.permission import key_of, list_obstacles, require_permission
-from rigtwin.hardware.session.record import open_virtual_card, record_in_real_time, record_unpaced
+from rigtwin.hardware.session.permission import require_permission
+from rigtwin.hardware.session.record import record_in_real_time, record_unpaced
 from rigtwin.hardware.session.stops import stop_requests
 from rigtwin.hardware.session.test import AnyTest
 from rigtwin.hardware.supervision import SessionEnd
 from rigtwin.hardware.supervisor import COMPLETED
-from rigtwin.simulation.peaks import Peak
 
 PORTS = 65535
 Stop = Callable[[], str | None]
@@ -36,8 +31,16 @@ Stop = Callable[[], str | None]
 
 
 @contextmanager
-def _stopped_by(stop: Stop | None, file: str | Path | None) -> Iterator[Stop]:
-    """Yield the function that may stop a test: `stop`, or the operator's keys, signals and file."""
+def stopped_by(stop: Stop | None, file: str | Path | None) -> Iterator[Stop]:
+    """Yield the function that may stop a test.
+
+    Parameters
+    ----------
+    stop
+        Function called in every tick. None lets the operator's keys, signals and file stop it.
+    file
+        File whose appearance stops the test.
+    """
     if stop is not None:
         yield stop
     else:
@@ -65,108 +68,6 @@ class SessionResult:
     ticks: int
     cause: str
     completed: bool
-
-
-@dataclass(frozen=True)
-class DryRun:
-    """Result of a session on the virtual card.
-
-    Attributes
-    ----------
-    recording : Recording or None
-        Recording of the session; None if it ended before the first tick.
-    cause : str
-        Reason why the session ended, in words.
-    passed : bool
-        True if the session reached its planned end. Only then may the rig be armed for this test.
-    peaks : tuple of Peak
-        Predicted peak of each limited quantity, with its limit and margin.
-    obstacles : tuple of str
-        Further reasons that prevent the test on the rig, one line each.
-    """
-
-    recording: Recording | None
-    cause: str
-    passed: bool
-    peaks: tuple[Peak, ...]
-    obstacles: tuple[str, ...]
-
-
-def dry_run(
-    experiment: str,
-    card: str | Path,
-    *,
-    path: str | Path,
-    machine: Machine | str | Path = DEFAULT_MACHINE,
-    settings: Settings = (),
-    seed: int = 0,
-    controller: ControllerFactory | None = None,
-    effects: Effects = (),
-    progress: Callable[[int], object] = lambda _: None,
-    stop: Stop | None = None,
-    stop_file: str | Path | None = None,
-) -> DryRun:
-    """Run the exact session of a test on the virtual card, before the machine is armed for it.
-
-    A session that passes is noted beside the channel table. The machine can then be armed by a
-    person, for exactly this test.
-
-    Parameters
-    ----------
-    experiment, machine, card, settings, seed, controller
-        Test to rehearse, see `plan_test`. With the shipped channel table nothing is noted.
-    effects
-        Effects added to the twin. With any effect nothing is noted.
-    path
-        File of the recording, MCAP.
-    progress
-        Function called with the number of ticks since its last call.
-    stop
-        Function that returns a reason to end the session, or None. By default the session ends at
-        a key, or at a signal such as Ctrl-C's.
-    stop_file
-        File whose appearance ends the session, unless `stop` is given.
-
-    Returns
-    -------
-    DryRun
-        Reason of the end, the recording, and the margin to every limit.
-
-    Raises
-    ------
-    RigtwinError
-        If the test could not be run on the machine either.
-    """
-    test = plan_test(
-        experiment,
-        machine=machine,
-        card=card,
-        settings=settings,
-        seed=seed,
-        effects=effects,
-        controller=controller,
-    )
-    with _stopped_by(stop, stop_file) as asked:
-        ended = record_unpaced(open_virtual_card(test)[0], test, Path(path), asked, progress)
-    if ended.cause == COMPLETED and not test.effects:
-        _note_dry_run(test, Path(card))
-    return _judge_dry_run(test, Path(path), ended)
-
-
-def _judge_dry_run(test: AnyTest, path: Path, ended: SessionEnd) -> DryRun:
-    # A session that ended before its test has no ticks, and cannot be loaded.
-    recording = load(path) if ended.ticks else None
-    peaks = test.predict_peaks(recording) if recording is not None else ()
-    passed = ended.cause == COMPLETED
-    return DryRun(recording, ended.cause.reason, passed, peaks, list_obstacles(test))
-
-
-def _note_dry_run(test: AnyTest, card: Path) -> None:
-    """Note a passed dry run beside the channel table."""
-    # The shipped table arms nothing, and its folder may be read-only.
-    if card.resolve().parent != CARD.resolve().parent:
-        note = {"experiment": test.experiment, "date": date.today().isoformat()}
-        add_dry_run(card, key_of(test), note)
 
 
 def run_on_twin(
@@ -221,7 +122,7 @@ def run_on_twin(
         controller=controller,
     )
     twin = WiredTwin(test.terminals(), test.table)
-    with _stopped_by(stop, stop_file) as asked:
+    with stopped_by(stop, stop_file) as asked:
         if real_time:
             timed = InRealTime(twin, test.period)
             ended = record_in_real_time(
@@ -287,7 +188,7 @@ def run_on_card(
     permission = require_permission(test, Path(card), without_dry_run)
     if not arm(test):  # A person is asked last: after arming, the rig moves.
         return None
-    with _stopped_by(stop, stop_file) as asked:
+    with stopped_by(stop, stop_file) as asked:
         ended = record_in_real_time(
             permission.card,
             test,

@@ -58,7 +58,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def execute(parsed: argparse.Namespace) -> int:
     """Prints the criteria and the largest force, motion and speed of every plant."""
-    from experiments.rths.hybrid_test import BENCHMARK, NONE
+    from experiments.rths.noise import BENCHMARK, NONE
 
     if parsed.json is not None:
         writable(parsed.json)

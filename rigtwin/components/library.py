@@ -12,7 +12,6 @@ from difflib import get_close_matches
 from rigtwin.components import (
     body,
     computer,
-    conditioning,
     end_stops,
     guide_effects,
     mass,
@@ -20,6 +19,7 @@ from rigtwin.components import (
     rotor,
     schedule,
     servo,
+    signal_effects,
     tyre,
 )
 from rigtwin.components.effect import Effect, Kind
@@ -34,7 +34,7 @@ MODULES = (
     body,
     rotor,
     tyre,
-    conditioning,
+    signal_effects,
     servo,
     schedule,
     computer,

@@ -13,10 +13,11 @@ from rigtwin.components import KINDS, UNLIMITED
 from rigtwin.components.quantity import Quantity, describe_disorder, fields
 from rigtwin.components.sensors import MEASURES
 from rigtwin.description.actuator_law import VELOCITY_SERVO
-from rigtwin.description.machine import Component, ReplayOf
+from rigtwin.description.component import Component
 from rigtwin.description.mechanism import Mechanism
 from rigtwin.description.mistakes import Mistakes, suggest
 from rigtwin.description.physics import Physics, find_physics
+from rigtwin.description.replay import ReplayOf
 from rigtwin.description.tolerance import Tolerance
 from rigtwin.recording.schema import NAME as FIELD_NAME
 

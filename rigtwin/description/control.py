@@ -28,7 +28,8 @@ from controllers import (
     unpacked,
     update,
 )
-from controllers.formula import Formula, Program, formula
+from controllers.formula import Formula, formula
+from controllers.formula_program import Program
 from rigtwin.description.settings import Nothing, settings_of
 from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array

@@ -4,19 +4,26 @@ description need not write them down."""
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from typing import Any
 
 from rigtwin.description.actuator_law import VELOCITY_SERVO
 from rigtwin.description.coupling import are_coupled
+from rigtwin.description.implied_parts import (
+    FREE_SERVO,
+    Implied,
+    add_free_joints,
+    add_links,
+    add_mass,
+    add_rotor,
+    add_tendons,
+    sensor_table,
+)
 from rigtwin.description.joint_elements import (
     actuator_name,
     actuator_on,
-    body_of,
     identifier,
     movable_joints,
     sensor_name,
-    sensor_on,
     swinging,
 )
 from rigtwin.description.mechanism import Mechanism
@@ -53,44 +60,6 @@ PRESCRIBED = [
 """Effects at coupled joints with prescribed motion."""
 PRESCRIBED_FORCE = ["gain", "lag", "delay"]
 """Effects of the measured forces at coupled joints with prescribed motion."""
-FREE = [
-    "coulomb",
-    "viscous",
-    "offset",
-    "stiffness",
-    "stribeck",
-    "load_friction",
-    "position_force",
-    "end_stops",
-]
-"""Effects at coupled joints that are free to move."""
-FREE_SERVO = [
-    "gains",
-    "position_gain",
-    "damping_gain",
-    "delay",
-    "lag",
-    "force_limit",
-    "rate_limit",
-    "deadband",
-]
-"""Effects of servos that move coupled joints."""
-
-
-@dataclass
-class Implied:
-    """Tables that a description implies.
-
-    Attributes
-    ----------
-    components
-        Component name → table.
-    replays
-        Tables of the replays.
-    """
-
-    components: dict[str, dict[str, Any]] = field(default_factory=dict)
-    replays: list[Mapping[str, Any]] = field(default_factory=list)
 
 
 def expand(
@@ -202,7 +171,7 @@ def _add_group(
         sensors.append(name)
         # The measured motions are the reference of the test: errors of their sensors would be
         # confounded with effects of the joints.
-        tables[name] = _sensor(mechanism, joint, measured) | {"effects": []}
+        tables[name] = sensor_table(mechanism, joint, measured) | {"effects": []}
     if test != POSITIONS:
         for joint in joints:
             # Position commands move the joint whatever the load, so its friction cannot be seen.
@@ -215,12 +184,12 @@ def _add_group(
     replay = {**keys, "moved_by": movers, "observe": sensors}
     if test != POSITIONS and len(joints) > 1:
         replay["free"] = list(joints)
-        _add_free_joints(joints, mechanism, tables, free)
+        add_free_joints(joints, mechanism, tables, free)
         for name in movers if test == SERVOS else ():
             tables[name]["effects"] = FREE_SERVO
     elif test != POSITIONS:
-        _add_mass(mechanism, joints[0], tables)
-        _add_rotor(joints[0], tables)
+        add_mass(mechanism, joints[0], tables)
+        add_rotor(joints[0], tables)
         weighs = any(mechanism.joint(joints[0]).gravity) and joints[0] not in velocities
         if test == FORCES and weighs:
             # The gravity load depends on the true angle, which makes the encoder's zero observable.
@@ -234,18 +203,18 @@ def _add_forces(
     """Add the components of joints that move as measured; return the names of the force sensors."""
     forces = [sensor_name(mechanism, joint, "force") for joint in joints]
     for joint, name in zip(joints, forces, strict=True):
-        tables[name] = _sensor(mechanism, joint, "force")
+        tables[name] = sensor_table(mechanism, joint, "force")
     if len(joints) == 1:
-        _add_mass(mechanism, joints[0], tables)
+        add_mass(mechanism, joints[0], tables)
         return forces
     for joint, name in zip(joints, forces, strict=True):
         # Several joints: a short list keeps the number of explanations small enough to tell apart.
         tables[identifier(joint)]["effects"] = PRESCRIBED
         tables[name]["effects"] = PRESCRIBED_FORCE
-        _add_rotor(joint, tables)
-    _add_tendons(mechanism, joints, tables)
+        add_rotor(joint, tables)
+    add_tendons(mechanism, joints, tables)
     # What the last link holds has an inertia of its own, which measured forces show.
-    _add_links(mechanism, joints, ["mass", "inertia", "payload"], tables)
+    add_links(mechanism, joints, ["mass", "inertia", "payload"], tables)
     return forces
 
 
@@ -271,73 +240,3 @@ def _add_movers(
             tables[name] = {"joint": joint, "type": MOVERS[test], "effects": []}
             movers.append(name)
     return movers
-
-
-def _add_free_joints(
-    joints: Sequence[str],
-    mechanism: Mechanism,
-    tables: dict[str, dict[str, Any]],
-    free: Sequence[str],
-) -> None:
-    """Add the effects and links of coupled joints whose motion follows from forces."""
-    for joint in joints:
-        tables[identifier(joint)]["effects"] = FREE
-    # Without a force from an actuator, only ratios of friction and masses to one of the masses can
-    # be seen. One known force is enough, since coupled joints pass it on.
-    _add_links(mechanism, joints[1:] if free else joints, ["mass", "payload"], tables)
-
-
-def _sensor(mechanism: Mechanism, joint: str, measured: str) -> dict[str, Any]:
-    """Return the table of a sensor: one of the MJCF, or one without an element of its own."""
-    known = sensor_on(mechanism, joint, measured)
-    return {"sensor": known} if known else {"joint": joint, "type": f"{measured} sensor"}
-
-
-def _add_tendons(
-    mechanism: Mechanism, joints: Sequence[str], tables: dict[str, dict[str, Any]]
-) -> None:
-    """Add the fixed tendons with friction that couples joints, such as those of a wrist."""
-    for tendon in mechanism.names("tendon"):
-        # A tendon that passes another joint too would see a motion that is not measured.
-        along = [joint for joint, _ in mechanism.acts_on("tendon", tendon)]
-        if along and set(along) <= set(joints):
-            tables[identifier(tendon)] = {"tendon": tendon, "effects": ["coulomb", "viscous"]}
-
-
-def _add_rotor(joint: str, tables: dict[str, dict[str, Any]]) -> None:
-    """Add the rotor that turns with a joint: data sheets of robots seldom state its inertia."""
-    name = f"{identifier(joint)}_rotor"
-    # A joint or a body of the model may have that name already.
-    name = f"{name}_inertia" if name in tables else name
-    tables[name] = {"joint": joint, "type": "rotor", "effects": ["armature"]}
-
-
-def _add_links(
-    mechanism: Mechanism,
-    joints: Sequence[str],
-    last: Sequence[str],
-    tables: dict[str, dict[str, Any]],
-) -> None:
-    """Add the rigid bodies that joints carry: their masses, and the effects of the last one."""
-    for joint in joints:
-        _add_link(mechanism, joint, last if joint == joints[-1] else ["mass"], tables)
-
-
-def _add_link(
-    mechanism: Mechanism, joint: str, effects: Sequence[str], tables: dict[str, dict[str, Any]]
-) -> None:
-    """Add the rigid body that a joint moves, if it has a name."""
-    body = body_of(mechanism, joint)
-    if body:
-        name = identifier(body)
-        name = f"{name}_body" if name in tables else name
-        tables[name] = {"body": body, "type": "body", "effects": list(effects)}
-
-
-def _add_mass(mechanism: Mechanism, joint: str, tables: dict[str, dict[str, Any]]) -> None:
-    """Add the mass that moves with a joint that is replayed alone."""
-    body = body_of(mechanism, joint)
-    # A body with several joints moves with more than this one.
-    if body and mechanism.joint_of("body", body) == joint:
-        name = identifier(body)
-        tables[f"{name}_mass" if name in tables else name] = {"body": body, "effects": ["mass"]}

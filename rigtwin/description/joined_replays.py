@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from rigtwin.description.component_tables import PUSHING, SENSED, Components
-from rigtwin.description.machine import ReplayOf, Row
 from rigtwin.description.mechanism import Mechanism
 from rigtwin.description.mistakes import Mistakes, suggest
+from rigtwin.description.replay import ReplayOf, Row
 from rigtwin.errors import RigtwinError
 
 MOVERS = (*PUSHING, "position actuator", "position sensor")

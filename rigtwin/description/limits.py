@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 
 from rigtwin.components.quantity import Quantity
+from rigtwin.description.component import Component
 from rigtwin.description.configuration import Configuration
-from rigtwin.description.machine import Component, Machine
+from rigtwin.description.machine import Machine
 from rigtwin.description.mistakes import Mistakes, suggest
 from rigtwin.description.settings import Nothing, group_of
 from rigtwin.errors import RigtwinError

@@ -13,13 +13,14 @@ from typing import Any
 from rigtwin.components import Effect, candidates
 from rigtwin.components.plant import select
 from rigtwin.components.quantity import Quantity
-from rigtwin.components.sensors import MEASURES
 from rigtwin.description.changes import override
+from rigtwin.description.component import Component
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.control import Control
 from rigtwin.description.model_checks import list_files
 from rigtwin.description.physics import Physics, physics_named
 from rigtwin.description.prior import ModelPrior
+from rigtwin.description.replay import ReplayOf, Row
 from rigtwin.description.settings import Nothing
 from rigtwin.description.tolerance import Tolerance
 from rigtwin.errors import RigtwinError
@@ -45,153 +46,6 @@ TURNING = {
     "Ns^2/m^2": "Nms^2/rad^2",
 }
 """Unit of a quantity at a slide → its unit at a hinge."""
-
-
-@dataclass(frozen=True)
-class Component:
-    """One component of a described machine.
-
-    Attributes
-    ----------
-    name
-        Name in the description.
-    component_type
-        Type of its parameters, such as `Guide`.
-    element
-        Kind of MJCF element that the component stands for, such as `joint`.
-    mjcf
-        Name of that element in the MJCF.
-    joint
-        Joint that the component belongs to; empty if it belongs to several or none.
-    channel
-        Topic and field of its signal in recordings; None without a signal.
-    unit
-        Unit of the signal.
-    kinds
-        Kinds of effects that it may have; None for all kinds of its type.
-    acts_on
-        Joints on which a force along the component's coordinate acts, with the change of the
-        coordinate per unit of the joint's position.
-    turns
-        Whether the coordinate is an angle.
-    """
-
-    name: str
-    component_type: type
-    element: str
-    mjcf: str
-    joint: str
-    channel: tuple[str, str] | None = None
-    unit: str = ""
-    kinds: frozenset[str] | None = None
-    acts_on: tuple[tuple[str, float], ...] = ()
-    turns: bool = False
-
-    @property
-    def quantity(self) -> str:
-        """Quantity that a sensor measures, as a row's kind; empty for all other components."""
-        return MEASURES.get(self.component_type, "")
-
-
-@dataclass(frozen=True)
-class Row:
-    """One observed signal, which a replay predicts.
-
-    Attributes
-    ----------
-    name
-        Name of the sensor, or of the controller's command.
-    kind
-        Kind of signal: `position`, `velocity`, `force` or `command`.
-    channel
-        Topic and field in recordings.
-    unit
-        Unit of the signal.
-    """
-
-    name: str
-    kind: str
-    channel: tuple[str, str]
-    unit: str
-
-
-@dataclass(frozen=True)
-class Joint:
-    """Mechanics of a replay's joint, from the MJCF, with all other joints at rest.
-
-    Attributes
-    ----------
-    name
-        Name of the joint.
-    turns
-        Whether the joint is a hinge.
-    inertia
-        Moving inertia with the armature, kg, or kg m² of a hinge.
-    positions
-        Positions over the joint's range, m or rad.
-    gravity
-        Gravity load at these positions, N or Nm.
-    rest
-        Position at which the joint's spring is relaxed, m or rad.
-    armature
-        Part of the inertia that turns with the motor and has no weight, kg or kg m².
-    """
-
-    name: str
-    turns: bool
-    inertia: float
-    positions: tuple[float, ...]
-    gravity: tuple[float, ...]
-    rest: float
-    armature: float = 0.0
-
-    @property
-    def goes_round(self) -> bool:
-        """Whether the range is a whole turn, so that both of its ends are the same position."""
-        whole = self.positions[-1] - self.positions[0]
-        return self.turns and math.isclose(whole, 2.0 * math.pi)
-
-
-@dataclass(frozen=True)
-class ReplayOf:
-    """Replay of one joint, or of several coupled joints.
-
-    Attributes
-    ----------
-    name
-        Name of the replay.
-    joint
-        Replayed joint; the first one of coupled joints.
-    moved_by
-        Components whose recorded signals move the joint. A position sensor prescribes the measured
-        motion, a position actuator the motion that follows its command, and a force actuator or
-        servo exerts a force.
-    rows
-        Observed signals.
-    guide
-        Component with the joint's friction, stiffness and gravity; None without one.
-    mass
-        Component with the moving mass; None without one.
-    closed
-        Whether the simulated controller commands the actuator, instead of the recorded command.
-    band
-        Frequency up to which signals are judged, Hz; None for the whole measured band.
-    rotor
-        Component with the inertia of the joint's motor; None without one.
-    free
-        Joints whose motion follows by forward dynamics.
-    """
-
-    name: str
-    joint: Joint
-    moved_by: tuple[str, ...]
-    rows: tuple[Row, ...]
-    guide: str | None
-    mass: str | None
-    closed: bool
-    band: float | None = None
-    rotor: str | None = None
-    free: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -19,8 +19,8 @@ from rigtwin.description.actuator_law import (
     velocity_law,
 )
 from rigtwin.description.closed_loops import refuse_closed_loops
-from rigtwin.description.machine import Joint
 from rigtwin.description.model_checks import check_text, check_values
+from rigtwin.description.replay import Joint
 from rigtwin.errors import RigtwinError
 
 OBJECTS = {

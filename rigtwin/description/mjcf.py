@@ -13,7 +13,8 @@ import numpy as np
 from rigtwin.components import SERVOS, ForceActuator, Guide, Mass, Rail, Rotor, Servo, component_of
 from rigtwin.components.quantity import UNLIMITED
 from rigtwin.components.servo import PUSHERS, pusher_of
-from rigtwin.description.machine import Component, Machine
+from rigtwin.description.component import Component
+from rigtwin.description.machine import Machine
 from rigtwin.description.mechanism import Mechanism
 from rigtwin.description.mjcf_text import PARENTS, Document, Tag
 from rigtwin.errors import RigtwinError

@@ -9,8 +9,9 @@ import mujoco
 import numpy as np
 
 from rigtwin.components.sensors import MEASURES
-from rigtwin.description.machine import Component, ReplayOf
+from rigtwin.description.component import Component
 from rigtwin.description.mechanism import Mechanism, Tie
+from rigtwin.description.replay import ReplayOf
 
 ELEMENTS = (("free", mujoco.mjtJoint.mjJNT_FREE), ("ball", mujoco.mjtJoint.mjJNT_BALL))
 """Types of joints that no replay moves, with their MJCF names."""

@@ -22,10 +22,11 @@ from rigtwin.recording import Inputs, RecordedTest
 
 if TYPE_CHECKING:
     from rigtwin.components.plant import Plant
-    from rigtwin.description.machine import Machine, ReplayOf
+    from rigtwin.description.machine import Machine
     from rigtwin.description.mechanism import Mechanism
+    from rigtwin.description.replay import ReplayOf
     from rigtwin.diagnosis.evidence import Evidence
-    from rigtwin.diagnosis.finding import Level
+    from rigtwin.diagnosis.gap import Level
     from rigtwin.diagnosis.residual import Residual
     from rigtwin.hardware.daq.signals import Signals
     from rigtwin.hardware.daq.table import ChannelTable

@@ -8,10 +8,10 @@ from typing import Any
 from rigtwin.description.component_tables import MOVING, PUSHING, SENSED, WHOLE, Components
 from rigtwin.description.control import Control, FormulaControl
 from rigtwin.description.joined_replays import JoinedReplays
-from rigtwin.description.machine import Joint, ReplayOf, Row
 from rigtwin.description.mechanism import Mechanism
 from rigtwin.description.mistakes import Mistakes, suggest
 from rigtwin.description.physics import Physics
+from rigtwin.description.replay import Joint, ReplayOf, Row
 from rigtwin.description.tolerance import Tolerance
 from rigtwin.errors import RigtwinError
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from rigtwin.diagnosis.finding import Answer, Place
+from rigtwin.diagnosis.answer import Answer
+from rigtwin.diagnosis.finding import Place
 from rigtwin.diagnosis.words import name_part
 
 CONFIDENT = 0.9

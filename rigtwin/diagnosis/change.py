@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
-from rigtwin.diagnosis.finding import Interval, Name
+from rigtwin.diagnosis.finding import Name
+from rigtwin.diagnosis.gap import Interval
 from rigtwin.diagnosis.homogeneity import Trend
 from rigtwin.diagnosis.result import Diagnosis
 

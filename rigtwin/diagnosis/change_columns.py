@@ -9,10 +9,10 @@ import numpy as np
 from rigtwin.components import Effect, measures
 from rigtwin.components.plant import Plant
 from rigtwin.description.machine import Machine
-from rigtwin.diagnosis.by_recording import FreeParameter
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.fit import is_possible
 from rigtwin.diagnosis.fitter import LIMITS, Fitter
+from rigtwin.diagnosis.recording_equations import FreeParameter
 
 STEP_FACTOR = 3.0
 """Ratio of the finite-difference steps to those of a search.

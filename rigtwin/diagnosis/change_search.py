@@ -15,17 +15,14 @@ from functools import reduce
 import numpy as np
 
 from rigtwin.components.plant import Plant
-from rigtwin.diagnosis.by_recording import (
-    BLOCKS,
-    ByRecording,
-    FreeParameter,
-    RecordingEstimates,
-)
+from rigtwin.diagnosis.by_recording import ByRecording, RecordingEstimates
 from rigtwin.diagnosis.change import ComparedParameter
 from rigtwin.diagnosis.change_columns import list_parameters
-from rigtwin.diagnosis.finding import Interval, Name
+from rigtwin.diagnosis.finding import Name
 from rigtwin.diagnosis.fitter import Fitter
+from rigtwin.diagnosis.gap import Interval
 from rigtwin.diagnosis.homogeneity import check_homogeneity, correct
+from rigtwin.diagnosis.recording_equations import BLOCKS, FreeParameter
 from rigtwin.diagnosis.result import Diagnosis
 from rigtwin.diagnosis.threads import Threads
 from rigtwin.diagnosis.thresholds import Thresholds

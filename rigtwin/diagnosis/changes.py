@@ -15,13 +15,13 @@ from threadpoolctl import threadpool_limits
 
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Machine
-from rigtwin.diagnosis.by_recording import BLOCKS
 from rigtwin.diagnosis.change import Changes, ComparedParameter
 from rigtwin.diagnosis.change_search import ChangeModel, ChangeSearch
 from rigtwin.diagnosis.changes_text import change_sentence
 from rigtwin.diagnosis.diagnose import diagnose
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.homogeneity import fit_trends, name_trends
+from rigtwin.diagnosis.recording_equations import BLOCKS
 from rigtwin.diagnosis.result import Diagnosis
 from rigtwin.diagnosis.thresholds import STANDARD, Thresholds
 from rigtwin.errors import RigtwinError

@@ -10,8 +10,8 @@ import numpy as np
 from rigtwin.components import Effect
 from rigtwin.components.plant import Plant
 from rigtwin.diagnosis.evidence import Evidence
-from rigtwin.diagnosis.finding import Interval
 from rigtwin.diagnosis.fit import Fit, with_values
+from rigtwin.diagnosis.gap import Interval
 from rigtwin.diagnosis.posterior import HypothesisPosterior
 from rigtwin.diagnosis.shrinkage import Blocks, blocks, interval, largest_shrinkage, mean_shrinkage
 from rigtwin.diagnosis.thresholds import STANDARD, Thresholds

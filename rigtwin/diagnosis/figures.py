@@ -9,34 +9,30 @@ Bokeh draws them. Its wheel ships its JavaScript, of which the core alone is bun
 from __future__ import annotations
 
 import hashlib
-import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from bokeh.embed import components
-from bokeh.models import ColumnDataSource, Range1d
+from bokeh.models import Range1d
 from bokeh.plotting import figure
 from bokeh.resources import Resources
 from markupsafe import Markup
 
+from rigtwin.diagnosis.figure_parts import (
+    LABELS,
+    axis_label,
+    draw_curve,
+    make_figure,
+    place_legend,
+    thin,
+)
 from rigtwin.diagnosis.overlay import Overlay
 from rigtwin.diagnosis.picture import Picture, PictureCurve
 from rigtwin.diagnosis.units import find_unit, spell
 from rigtwin.numerics.arrays import Array
 
-MEASURED, BEFORE, AFTER, SAMPLES = "#1e293b", "#c2410c", "#0f766e", "#94a3b8"
-COLOURS = {"measured": MEASURED, "before": BEFORE, "after": AFTER, "samples": SAMPLES}
-LABELS = {
-    "measured": "measured",
-    "before": "without the effect",
-    "after": "with the effect",
-    "samples": "single samples",
-}
-WIDTHS = {"measured": 6.0, "before": 1.8, "after": 1.6}
-HEIGHT = 340
-"""Height of a figure, px."""
 ALL_POINTS = 240_000
 """Points of all overlaid lines of a report together."""
 MOST, LEAST = 4000, 600
@@ -45,8 +41,6 @@ IDENTIFIER = re.compile(r'"(p\d{4,}|[0-9a-f]{8}(?:-[0-9a-f]{4}){3}-[0-9a-f]{12})
 """Identifiers that Bokeh draws at random for its models and their places on the page."""
 MARGIN = 0.06
 """Margin of an axis beyond the values in view, as a share of their range."""
-CROWD = 100
-"""Points from which a cloud is drawn with small, translucent dots."""
 
 
 @dataclass(frozen=True)
@@ -90,114 +84,6 @@ class Drawings:
     script: Markup
 
 
-def thin(time: Array, values: Array, points: int) -> tuple[Array, Array]:
-    """Thin a line so that its extremes remain.
-
-    Every block of ticks keeps its smallest and its largest value. A pixel that holds a block then
-    shows the same stroke as with all ticks, so peaks stay visible.
-
-    Parameters
-    ----------
-    time, values
-        Coordinates, shape (ticks,).
-    points
-        Largest number of points of the result, plus one for an incomplete last block.
-
-    Returns
-    -------
-    tuple of arrays
-        Time and values of the remaining ticks, in their order.
-    """
-    if len(values) <= points:
-        return time, values
-    # Two values of each block remain, hence the factor 2.
-    block = math.ceil(2 * len(values) / points)
-    whole = len(values) // block * block
-    folded = values[:whole].reshape(-1, block)
-    start = np.arange(len(folded)) * block
-    # `unique` also sorts, as the minimum of a block may come after its maximum.
-    remaining = np.unique(
-        np.concatenate([start + folded.argmin(axis=1), start + folded.argmax(axis=1)])
-    )
-    # The line must reach the end of the recording also where the last block is incomplete.
-    if whole < len(values):
-        remaining = np.append(remaining, len(values) - 1)
-    return time[remaining], values[remaining]
-
-
-def _make_figure(
-    x: str, y: str, logarithmic: tuple[bool, bool], start: Range1d | None = None
-) -> figure:
-    ranges = {} if start is None else {"x_range": start}
-    drawn = figure(
-        height=HEIGHT,
-        sizing_mode="stretch_width",
-        x_axis_label=x,
-        y_axis_label=y,
-        x_axis_type="log" if logarithmic[0] else "linear",
-        y_axis_type="log" if logarithmic[1] else "linear",
-        tools="box_zoom,xwheel_zoom,pan,reset,save",
-        active_drag="box_zoom",
-        active_scroll=None,
-        min_width=260,
-        **ranges,
-    )
-    drawn.toolbar.logo = None
-    drawn.toolbar.autohide = True
-    drawn.outline_line_color = None
-    for axis in drawn.axis:
-        axis.axis_label_text_font_style = "normal"
-        axis.axis_label_text_font_size = "13px"
-        axis.major_label_text_font_size = "12px"
-        axis.axis_label_text_color = axis.major_label_text_color = "#334155"
-        axis.axis_line_color = "#94a3b8"
-        axis.minor_tick_line_color = None
-    for grid in drawn.grid:
-        grid.grid_line_color = "#e2e8f0"
-    return drawn
-
-
-def _draw_curve(drawn: figure, curve: PictureCurve, x: Array, y: Array, label: str) -> None:
-    # Single precision halves the file; no screen has more digits.
-    source = ColumnDataSource({"x": x.astype(np.float32), "y": y.astype(np.float32)})
-    colour = COLOURS[curve.role]
-    if curve.points:
-        crowd = len(x) > CROWD
-        drawn.scatter(
-            "x",
-            "y",
-            source=source,
-            size=3 if crowd else 8,
-            color=colour,
-            alpha=0.45 if crowd else 1.0,
-            line_color=None,
-            legend_label=label,
-        )
-        return
-    drawn.line(
-        "x",
-        "y",
-        source=source,
-        color=colour,
-        # The measured line is broad and pale, so that it stays visible under a prediction.
-        line_width=WIDTHS[curve.role],
-        line_alpha=0.4 if curve.role == "measured" else 1.0,
-        line_dash="dashed" if curve.role == "before" else "solid",
-        legend_label=label,
-    )
-
-
-def _place_legend(drawn: figure) -> None:
-    legend = drawn.legend[0]
-    drawn.add_layout(legend, "above")
-    legend.orientation = "horizontal"
-    legend.ncols = 3 if len(drawn.renderers) == 3 else 2
-    legend.border_line_color = None
-    legend.label_text_font_size = "12px"
-    legend.padding, legend.spacing, legend.margin = 2, 12, 2
-    legend.click_policy = "hide"
-
-
 def draw_picture(picture: Picture) -> figure:
     """Draw an effect in the data.
 
@@ -215,17 +101,13 @@ def draw_picture(picture: Picture) -> figure:
     y_all = np.concatenate([curve.y for curve in picture.curves])
     x_factor, x_unit = find_unit(picture.x_unit, float(np.max(np.abs(x_all), initial=0.0)))
     y_factor, y_unit = find_unit(picture.y_unit, float(np.max(np.abs(y_all), initial=0.0)))
-    drawn = _make_figure(
-        _label(picture.x, x_unit), _label(picture.y, y_unit), picture.logarithmic, None
+    drawn = make_figure(
+        axis_label(picture.x, x_unit), axis_label(picture.y, y_unit), picture.logarithmic, None
     )
     for curve in picture.curves:
-        _draw_curve(drawn, curve, x_factor * curve.x, y_factor * curve.y, LABELS[curve.role])
-    _place_legend(drawn)
+        draw_curve(drawn, curve, x_factor * curve.x, y_factor * curve.y, LABELS[curve.role])
+    place_legend(drawn)
     return drawn
-
-
-def _label(name: str, unit: str) -> str:
-    return f"{name}, {unit}" if unit else name
 
 
 def draw_overlay(overlay: Overlay, points: int, corrected: bool) -> figure:
@@ -253,9 +135,9 @@ def draw_overlay(overlay: Overlay, points: int, corrected: bool) -> figure:
     first, last = float(overlay.time[0]), float(overlay.time[-1])
     largest = max(float(np.max(np.abs(values))) for values in signals.values())
     factor, unit = find_unit(overlay.unit, largest)
-    drawn = _make_figure(
+    drawn = make_figure(
         "time, s",
-        _label(overlay.sensor.replace("_", " "), unit),
+        axis_label(overlay.sensor.replace("_", " "), unit),
         (False, False),
         Range1d(start, end, bounds=(first, last)),
     )
@@ -267,8 +149,8 @@ def draw_overlay(overlay: Overlay, points: int, corrected: bool) -> figure:
     drawn.y_range = Range1d(low - margin, high + margin)
     for role, values in signals.items():
         time, thinned = _thin_outside(overlay.time, values, in_view, points)
-        _draw_curve(drawn, PictureCurve(role, time, thinned), time, factor * thinned, labels[role])
-    _place_legend(drawn)
+        draw_curve(drawn, PictureCurve(role, time, thinned), time, factor * thinned, labels[role])
+    place_legend(drawn)
     return drawn
 
 

@@ -15,8 +15,10 @@ from typing import TypeVar
 import numpy as np
 
 from rigtwin.components.plant import Plant, select
+from rigtwin.diagnosis.answer import Answer, Verdict
 from rigtwin.diagnosis.evidence import Evidence, relative_errors
-from rigtwin.diagnosis.finding import Answer, Finding, Gap, Interval, Place, Step, Verdict
+from rigtwin.diagnosis.finding import Finding, Place, Step
+from rigtwin.diagnosis.gap import Gap, Interval
 from rigtwin.diagnosis.result import Diagnosis
 from rigtwin.diagnosis.shrinkage import gap_level
 from rigtwin.diagnosis.text import sentence

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from rigtwin.components.plant import Plant
 from rigtwin.diagnosis.evidence import Evidence
-from rigtwin.diagnosis.finding import Level
+from rigtwin.diagnosis.gap import Level
 from rigtwin.signals.noise import rms
 
 

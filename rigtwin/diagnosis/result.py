@@ -12,9 +12,11 @@ from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Machine
 from rigtwin.description.mjcf import Change, write_mjcf
 from rigtwin.diagnosis import calibrated, report, text
+from rigtwin.diagnosis.answer import Answer, Verdict
 from rigtwin.diagnosis.evidence import Evidence
-from rigtwin.diagnosis.finding import Answer, Finding, Gap, Place, Verdict
+from rigtwin.diagnosis.finding import Finding, Place
 from rigtwin.diagnosis.fit import Fit
+from rigtwin.diagnosis.gap import Gap
 from rigtwin.diagnosis.overlay import Overlay, overlay
 from rigtwin.diagnosis.picture import Picture
 from rigtwin.diagnosis.pictures import picture

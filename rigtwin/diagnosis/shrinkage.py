@@ -23,7 +23,7 @@ import numpy as np
 
 from rigtwin.components.plant import Plant
 from rigtwin.diagnosis.evidence import Evidence
-from rigtwin.diagnosis.finding import Interval
+from rigtwin.diagnosis.gap import Interval
 from rigtwin.numerics.arrays import Array
 
 BLOCK = 0.5

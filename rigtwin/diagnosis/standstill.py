@@ -15,7 +15,8 @@ import numpy as np
 from rigtwin.components import PUSHERS, Guide, Pusher
 from rigtwin.components.plant import parameter_of
 from rigtwin.components.servo import push_all, push_law, pusher_of
-from rigtwin.description.machine import Machine, ReplayOf, Row
+from rigtwin.description.machine import Machine
+from rigtwin.description.replay import ReplayOf, Row
 from rigtwin.diagnosis.units import say
 from rigtwin.diagnosis.words import name_part
 from rigtwin.numerics.arrays import Array

@@ -5,16 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from rigtwin.diagnosis.advice import advise
+from rigtwin.diagnosis.answer import Answer, Verdict
 from rigtwin.diagnosis.confounded_text import describe_confounded
-from rigtwin.diagnosis.finding import (
-    Answer,
-    Estimate,
-    Finding,
-    Gap,
-    Place,
-    Rival,
-    Verdict,
-)
+from rigtwin.diagnosis.finding import Estimate, Finding, Place, Rival
+from rigtwin.diagnosis.gap import Gap
 from rigtwin.diagnosis.units import shorten, spell, write
 from rigtwin.diagnosis.words import enumerate_words, indefinite_article, name_part
 

@@ -12,8 +12,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from rigtwin.components.plant import Plant
-from rigtwin.diagnosis.data_checks import channels
 from rigtwin.diagnosis.evidence import Evidence
+from rigtwin.diagnosis.unit_checks import channels
 from rigtwin.numerics.arrays import Array
 
 EXPLAINED = 0.1

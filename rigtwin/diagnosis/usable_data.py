@@ -7,11 +7,9 @@ from collections.abc import Sequence
 
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Machine
+from rigtwin.diagnosis.answer import Answer
 from rigtwin.diagnosis.copies import drop_copies, refuse_copies
 from rigtwin.diagnosis.data_checks import SHORTEST, find_faults
-from rigtwin.diagnosis.finding import (
-    Answer,
-)
 from rigtwin.diagnosis.short_recordings import drop_short, least_ticks
 from rigtwin.diagnosis.standstill import describe_standstill, find_standstill
 from rigtwin.recording import RecordedTest

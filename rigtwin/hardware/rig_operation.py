@@ -22,15 +22,14 @@ from rigtwin.hardware.operation import Course
 from rigtwin.hardware.supervisor import Cause
 from rigtwin.numerics.arrays import Array
 from rigtwin.simulation.safety import (
-    Trip,
     empty_memory,
-    explain_trip,
     find_arming_obstacle,
     is_beyond,
     judge_commands,
     judge_measurements,
     stop_state,
 )
+from rigtwin.simulation.trip import Trip, explain_trip
 
 LOOKING = 0.3
 """Time during which sensors are checked before the rig is armed, in s. Meanwhile everything that a

@@ -7,12 +7,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeGuard
 
-import numpy as np
-
 from rigtwin.description import catalogue
 from rigtwin.description.machine import Machine
 from rigtwin.errors import RigtwinError
-from rigtwin.files import atomic_path, forbid_overwriting, recordable
+from rigtwin.files import forbid_overwriting, recordable
 from rigtwin.importing.channels import Imported, find_column, make_channels
 from rigtwin.importing.columns import Columns, join
 from rigtwin.importing.episodes import Episode, split_episodes
@@ -21,10 +19,8 @@ from rigtwin.importing.map_file import load
 from rigtwin.importing.mapping import Map
 from rigtwin.importing.selection import EVERYTHING, Selection
 from rigtwin.importing.table import read
-from rigtwin.recording import Writer
+from rigtwin.importing.written_test import write_test
 
-BLOCK = 10_000
-"""Ticks written at a time."""
 Data = Any
 """List of paths, or data in memory."""
 ENDING = ".mcap"
@@ -78,7 +74,7 @@ def convert(
     wanted = load(mapping)
     described = _machine(wanted, machine)
     imported = read_channels(data, wanted, described)
-    return [*imported.report, _write(out, wanted, described, imported)]
+    return [*imported.report, write_test(out, wanted, described, imported)]
 
 
 def convert_episodes(
@@ -120,7 +116,7 @@ def convert_episodes(
         try:
             # One damaged episode must not prevent the conversion of the others.
             imported = make_channels(label, episode.columns, wanted, _units(wanted, described))
-            line = _write(recordable(out), wanted, described, imported)
+            line = write_test(recordable(out), wanted, described, imported)
         except RigtwinError as error:
             errors.append(error)
             header.append(f"episode {episode.number} is left out: {error}")
@@ -276,34 +272,3 @@ def _units(wanted: Map, machine: Machine | None) -> Mapping[str, str]:
     if machine is None and wanted.machine in catalogue.shipped():
         machine = catalogue.find(wanted.machine)
     return {} if machine is None else machine.units
-
-
-def _write(out: Path, wanted: Map, machine: Machine | None, imported: Imported) -> str:
-    """Write a recording; return the last line of the report."""
-    channels, period, ticks = imported.channels, imported.period, len(imported.time)
-    fields: dict[str, list[str]] = {}
-    for topic, field in channels:
-        fields.setdefault(topic, []).append(field)
-    name = wanted.machine if machine is None else machine.name
-    with (
-        # The recording appears under its name only when it is complete.
-        atomic_path(out) as beside,
-        Writer(
-            beside,
-            wanted.experiment,
-            period,
-            wanted.controller,
-            name,
-            {topic: tuple(each) for topic, each in fields.items()},
-            None if machine is None else catalogue.own_description(machine),
-        ) as writer,
-    ):
-        # Written in blocks: otherwise all messages of a long recording would be in memory at once.
-        for start in range(0, ticks, BLOCK):
-            part = slice(start, min(start + BLOCK, ticks))
-            blocks = {
-                topic.strip("/"): np.column_stack([channels[topic, each][part] for each in names])
-                for topic, names in fields.items()
-            }
-            writer.append(**blocks)
-    return f"{ticks} ticks of {period:g} s for machine {name} in {out}"

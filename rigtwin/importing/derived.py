@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from controllers.formula import (
+from controllers.formula import Formula
+from controllers.formula_program import (
     ABSOLUTE,
     ADD,
     CLIP,
@@ -26,7 +27,6 @@ from controllers.formula import (
     SINE,
     SMALLER,
     SUBTRACT,
-    Formula,
 )
 from rigtwin.numerics.arrays import Array
 

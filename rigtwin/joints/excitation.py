@@ -8,9 +8,11 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 
 from rigtwin.components import ForceActuator, component_of
+from rigtwin.description.component import Component
 from rigtwin.description.configuration import Configuration
-from rigtwin.description.machine import Component, Joint, Machine
+from rigtwin.description.machine import Machine
 from rigtwin.description.mechanism import Mechanism
+from rigtwin.description.replay import Joint
 from rigtwin.errors import RigtwinError
 from rigtwin.models.demands import demanded_channels
 from rigtwin.numerics.arrays import Array

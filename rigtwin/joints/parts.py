@@ -8,7 +8,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from rigtwin.description.machine import Component, Machine, ReplayOf, Row
+from rigtwin.description.component import Component
+from rigtwin.description.machine import Machine
+from rigtwin.description.replay import ReplayOf, Row
 
 
 def parts(machine: Machine) -> tuple[Machine, ...]:

@@ -11,9 +11,10 @@ import numpy as np
 from rigtwin.components import Servo
 from rigtwin.components.plant import Plant, plant_of
 from rigtwin.description.configuration import Configuration, flatten
-from rigtwin.description.machine import Machine, ReplayOf
+from rigtwin.description.machine import Machine
 from rigtwin.description.overlooked import overlooked
 from rigtwin.description.physics import Columns, Physics, TwinTest
+from rigtwin.description.replay import ReplayOf
 from rigtwin.description.settings import Nothing
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Inputs, RecordedTest
@@ -21,7 +22,7 @@ from rigtwin.recording import Inputs, RecordedTest
 if TYPE_CHECKING:
     from rigtwin.description.mechanism import Mechanism
     from rigtwin.diagnosis.evidence import Evidence
-    from rigtwin.diagnosis.finding import Level
+    from rigtwin.diagnosis.gap import Level
     from rigtwin.diagnosis.residual import Residual
     from rigtwin.hardware.daq.signals import Signals
     from rigtwin.hardware.daq.table import ChannelTable

@@ -7,7 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from rigtwin.components import PositionActuator
-from rigtwin.description.machine import Component, Machine
+from rigtwin.description.component import Component
+from rigtwin.description.machine import Machine
 from rigtwin.numerics.arrays import Array
 
 

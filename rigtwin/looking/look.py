@@ -26,6 +26,7 @@ from rigtwin.diagnosis.result import Diagnosis
 from rigtwin.diagnosis.thresholds import STANDARD
 from rigtwin.errors import RigtwinError
 from rigtwin.files import atomic_write, forbid_overwriting
+from rigtwin.looking.look_checks import check_look
 from rigtwin.looking.motions import find_positions, predicts_motion
 from rigtwin.looking.prediction import Prediction, judge
 from rigtwin.looking.slider import Slider, sliders_of
@@ -203,7 +204,7 @@ class Look:
         """
         effects = find_effects(self.machine, tuple(values))
         for effect, numbers in zip(effects, values.values(), strict=True):
-            _check(effect, numbers)
+            check_look(effect, numbers)
         return with_values(self._evidence.plant, effects, list(values.values()))
 
     def predict(self, values: Mapping[str, Sequence[float]]) -> Prediction:
@@ -290,19 +291,3 @@ class Look:
         out = forbid_overwriting(path, self.recording.path, *self.machine.files)
         atomic_write(out, "\n".join([*head, *tables]) + "\n")
         return Path(path)
-
-
-def _check(effect: Effect, numbers: Sequence[float]) -> None:
-    """Raise RigtwinError unless an effect has as many values as parameters, all within bounds."""
-    quantities = effect.quantities()
-    if len(numbers) != len(quantities):
-        raise RigtwinError(
-            f"{effect.name}: expected {len(quantities)} values ({', '.join(quantities)}), "
-            f"got {len(numbers)}"
-        )
-    for (name, quantity), value in zip(quantities.items(), numbers, strict=True):
-        if not quantity.low <= value <= quantity.high:
-            raise RigtwinError(
-                f"{effect.name}: {name} = {value:g}; expected {quantity.low:g} to "
-                f"{quantity.high:g} {quantity.unit}"
-            )

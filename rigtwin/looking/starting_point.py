@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from rigtwin.diagnosis.finding import VERDICTS
+from rigtwin.diagnosis.answer import VERDICTS
 from rigtwin.errors import RigtwinError
 from rigtwin.looking.look import Look
 from rigtwin.watching import Alarm

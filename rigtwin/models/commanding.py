@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from controllers.formula import run
+from controllers.formula_program import run
 from rigtwin.components.plant import Plant
 from rigtwin.components.sensors import sensor_of, start_transducer, transduce, transducer
 from rigtwin.description.control import Channel, FormulaControl

@@ -18,19 +18,22 @@ import numpy as np
 from rigtwin.components.plant import Plant, select
 from rigtwin.components.sensors import apply_sensor, sensor_of
 from rigtwin.description.configuration import Configuration
-from rigtwin.description.machine import Machine, ReplayOf, Row
+from rigtwin.description.machine import Machine
+from rigtwin.description.replay import ReplayOf, Row
+from rigtwin.models.bodies import inertia_at
 from rigtwin.models.forward_arrays import GuideContacts, State, allocate
 from rigtwin.models.forward_motion import advance
 from rigtwin.models.initial_state import InitialState, Seen
 from rigtwin.models.joint_drives import JointDrives, recorded
 from rigtwin.models.joint_layout import JointLayout
 from rigtwin.models.joint_simulation import KEPT, LIGHTEST
-from rigtwin.models.multibody import Multibody, inertia_at
+from rigtwin.models.multibody import Multibody
 from rigtwin.models.windows import Sense, Window, WindowStarts, divide
 from rigtwin.numerics.arrays import Array, clip_diverged
 from rigtwin.numerics.memo import Memo
 from rigtwin.recording import Inputs
-from rigtwin.signals.noise import smallest_step, smooth, white_noise
+from rigtwin.signals.motion import smooth
+from rigtwin.signals.noise import smallest_step, white_noise
 
 
 class CoupledJoints:

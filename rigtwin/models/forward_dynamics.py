@@ -20,7 +20,8 @@ from rigtwin.models.joint import SEED, SMALL
 from rigtwin.models.model import Form, Model
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Inputs
-from rigtwin.signals.noise import smooth, white_noise
+from rigtwin.signals.motion import smooth
+from rigtwin.signals.noise import white_noise
 
 COMMANDED = "/command"
 """Topic of the signals that are held from tick to tick."""

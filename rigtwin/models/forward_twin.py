@@ -13,7 +13,8 @@ from rigtwin.components.plant import Plant
 from rigtwin.components.sensors import apply_sensor, sensor_of
 from rigtwin.components.servo import push_law, pusher_of
 from rigtwin.description.configuration import Configuration
-from rigtwin.description.machine import Machine, ReplayOf, Row
+from rigtwin.description.machine import Machine
+from rigtwin.description.replay import ReplayOf, Row
 from rigtwin.models.commanding import Command, Readings, commands_of
 from rigtwin.models.coupled_joints import CoupledJoints, begin
 from rigtwin.models.demands import list_pushers, list_sensors

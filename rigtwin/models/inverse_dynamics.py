@@ -27,7 +27,8 @@ from rigtwin.components.plant import Plant, component_of, select
 from rigtwin.components.scales import Motion
 from rigtwin.components.schedule import follow, scheduled_force
 from rigtwin.components.sensors import apply_sensor, sensor_of
-from rigtwin.description.machine import Machine, ReplayOf, Row
+from rigtwin.description.machine import Machine
+from rigtwin.description.replay import ReplayOf, Row
 from rigtwin.models.basis import Passage, forms
 from rigtwin.models.joint import SEED, SMALL
 from rigtwin.models.joint_inverse import resist, resist_at_once
@@ -39,7 +40,8 @@ from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.memo import Memo
 from rigtwin.recording import Inputs
 from rigtwin.signals.band import limit_band
-from rigtwin.signals.noise import smooth, white_noise
+from rigtwin.signals.motion import smooth
+from rigtwin.signals.noise import white_noise
 
 STANDING, RESTING = 0.02, 0.1
 """Share of its rms speed below which a joint stands still, and shortest rest, s."""

@@ -14,7 +14,8 @@ from rigtwin.components.plant import Plant
 from rigtwin.components.scales import Motion
 from rigtwin.components.sensors import apply_sensor, sensor_of
 from rigtwin.description.configuration import Configuration
-from rigtwin.description.machine import Machine, ReplayOf, Row
+from rigtwin.description.machine import Machine
+from rigtwin.description.replay import ReplayOf, Row
 from rigtwin.models.basis import Passage, forms
 from rigtwin.models.joint_simulation import JointSimulation
 from rigtwin.models.measured_motion import ENDS, recover_motion
@@ -22,7 +23,8 @@ from rigtwin.models.model import Form, Model
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Inputs
 from rigtwin.signals.band import limit_band
-from rigtwin.signals.noise import motion_band, smooth, white_noise
+from rigtwin.signals.motion import motion_band, smooth
+from rigtwin.signals.noise import white_noise
 
 INERTIAL = 0.1
 """Share of inertia in the measured force above which the band of the motion limits the force."""

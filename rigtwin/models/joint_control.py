@@ -10,7 +10,8 @@ from rigtwin.components.plant import Plant
 from rigtwin.components.sensors import sensor_of, start_transducer, transducer
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.control import FormulaControl
-from rigtwin.description.machine import OWN, Machine, ReplayOf
+from rigtwin.description.machine import OWN, Machine
+from rigtwin.description.replay import ReplayOf
 from rigtwin.models.joint_motion import Loop
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Inputs

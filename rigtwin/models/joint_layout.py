@@ -9,7 +9,8 @@ import numpy as np
 from rigtwin.components import SERVOS, Base, Body, ForceActuator, Guide, Rotor, component_of
 from rigtwin.components.body import list_parameters, list_surplus, turn_gravity
 from rigtwin.components.plant import Plant, select
-from rigtwin.description.machine import Machine, ReplayOf
+from rigtwin.description.machine import Machine
+from rigtwin.description.replay import ReplayOf
 from rigtwin.models.joint_simulation import KEPT
 from rigtwin.models.multibody import Multibody
 from rigtwin.numerics.arrays import Array

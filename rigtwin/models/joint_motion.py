@@ -24,7 +24,7 @@ from typing import NamedTuple
 import numpy as np
 
 from controllers.compiled import compilable, inlined
-from controllers.formula import Program, run
+from controllers.formula_program import Program, run
 from rigtwin.components.conditioning import Actuator, ActuatorState, condition
 from rigtwin.components.guide_force import damping
 from rigtwin.components.guide_step import GuideStep

@@ -20,7 +20,8 @@ from rigtwin.components.schedule import follow, scheduled_force
 from rigtwin.components.sensors import Sensor, sensor_of
 from rigtwin.components.servo import play_of, push_all, push_law, pusher_of
 from rigtwin.description.configuration import Configuration
-from rigtwin.description.machine import Machine, ReplayOf
+from rigtwin.description.machine import Machine
+from rigtwin.description.replay import ReplayOf
 from rigtwin.models.following import follow_command
 from rigtwin.models.joint_control import JointControl
 from rigtwin.models.joint_inverse import inverse_dynamics
@@ -31,7 +32,7 @@ from rigtwin.models.start import Start
 from rigtwin.numerics.arrays import Array, clip_diverged
 from rigtwin.numerics.memo import Memo
 from rigtwin.recording import Inputs
-from rigtwin.signals.noise import smooth
+from rigtwin.signals.motion import smooth
 
 KEPT = 24
 """Number of motions that are remembered."""

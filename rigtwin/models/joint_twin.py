@@ -8,7 +8,8 @@ import numpy as np
 
 from rigtwin.components.sensors import apply_sensor, sensor_of
 from rigtwin.description.configuration import Configuration
-from rigtwin.description.machine import Machine, ReplayOf, Row
+from rigtwin.description.machine import Machine
+from rigtwin.description.replay import ReplayOf, Row
 from rigtwin.models.inputs import inputs_of_test
 from rigtwin.models.inverse_twin import SimulatedSignals
 from rigtwin.models.joint import PLACES

@@ -13,7 +13,8 @@ from rigtwin.description.configuration import Configuration, flatten
 from rigtwin.description.control import FormulaControl
 from rigtwin.description.effects import apply_effects
 from rigtwin.description.limits import LimitTrip, find_trip, require_order
-from rigtwin.description.machine import OWN, Machine, ReplayOf
+from rigtwin.description.machine import OWN, Machine
+from rigtwin.description.replay import ReplayOf
 from rigtwin.errors import RigtwinError
 from rigtwin.models.commanding import Command, Tick, command_by_formula, command_by_function
 from rigtwin.models.demands import Columns, check_demands, list_movers, list_sensors, list_wanted

@@ -26,7 +26,7 @@ from rigtwin.numerics.arrays import Array, clip_diverged
 from rigtwin.numerics.memo import Memo
 from rigtwin.recording import Inputs
 from rigtwin.simulation.converters import sensors
-from rigtwin.simulation.plant import initial_deflection, initial_yield
+from rigtwin.simulation.rig_contacts import initial_deflection, initial_yield
 
 COMPONENTS = (
     "motor",

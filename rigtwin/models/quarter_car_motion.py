@@ -38,7 +38,8 @@ from rigtwin.models.quarter_car_step import (
 )
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel, loop_kernel
-from rigtwin.simulation.plant import RigContacts, cogging_force, contacts
+from rigtwin.simulation.plant_forces import cogging_force
+from rigtwin.simulation.rig_contacts import RigContacts, contacts
 
 
 class PlateMotion(NamedTuple):

@@ -18,7 +18,8 @@ from controllers.compiled import compilable, inlined
 from rigtwin.components import RigPlant
 from rigtwin.components.dry_friction import breakaway
 from rigtwin.components.yielding import Rod, share_of_load, solve_yielding
-from rigtwin.simulation.plant import RigContacts, stiffness_ratio
+from rigtwin.simulation.plant_forces import stiffness_ratio
+from rigtwin.simulation.rig_contacts import RigContacts
 
 
 class CarriageConstants(NamedTuple):

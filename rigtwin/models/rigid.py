@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 
 from rigtwin.components.body import INERTIAL, Base, turn_gravity
-from rigtwin.description.machine import Component
+from rigtwin.description.component import Component
 from rigtwin.description.mechanism import compile_model
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import inverse, kernel

@@ -9,10 +9,10 @@ import numpy as np
 
 from rigtwin.components.conditioning import Actuator, ActuatorState, condition, hold
 from rigtwin.components.servo import Push, push
-from rigtwin.description.machine import Row
+from rigtwin.description.replay import Row
+from rigtwin.models.bodies import Bodies
 from rigtwin.models.forward_arrays import GuideContacts, State, StepInputs, allocate
 from rigtwin.models.forward_motion import advance
-from rigtwin.models.multibody import Bodies
 from rigtwin.numerics.arrays import Array
 
 

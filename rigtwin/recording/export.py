@@ -13,7 +13,7 @@ from scipy.io import savemat
 from rigtwin.errors import RigtwinError
 from rigtwin.files import atomic_write
 from rigtwin.recording.channels import channels_of
-from rigtwin.recording.reader import RecordedTest
+from rigtwin.recording.recorded_test import RecordedTest
 
 SHORT, LONGEST = 31, 55
 """Number of characters of a name that every MATLAB reads, and the maximum. A unit's name has its

@@ -13,7 +13,8 @@ from mcap.stream_reader import StreamReader
 from mcap.writer import MCAP0_MAGIC
 
 from rigtwin.errors import RigtwinError
-from rigtwin.recording.reader import FileContent, RecordedTest
+from rigtwin.recording.reader import FileContent
+from rigtwin.recording.recorded_test import RecordedTest
 from rigtwin.recording.records import (
     CHUNK_HEAD,
     DAMAGE,

@@ -6,12 +6,10 @@ Damage costs the chunk it hits, but not what follows. Metadata carry a checksum 
 from __future__ import annotations
 
 import io
-import json
 import mmap
 import os
 import struct
-import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import BinaryIO
 
@@ -48,8 +46,6 @@ _KNOWN, PRIVATE = frozenset(int(opcode) for opcode in Opcode), 0x80
 _PREFIX = struct.Struct("<BQ")
 _MESSAGE = struct.Struct("<HIQQ")
 """Layouts of a record's opcode and length, and of a message's channel, number and two times."""
-_CHECKSUM = "crc32"
-"""Key of the metadata entry that holds the checksum of all other entries."""
 
 
 @dataclass(frozen=True)
@@ -294,21 +290,3 @@ def find_chunk(data: bytearray | mmap.mmap, start: int) -> int | None:
     while at >= 0 and data[at - _PLACE] != Opcode.CHUNK:
         at = data.find(_COMPRESSION, at + 1)
     return at - _PLACE if at >= 0 else None
-
-
-def seal(values: Mapping[str, str]) -> dict[str, str]:
-    """Return metadata with a checksum of their entries."""
-    return {**values, _CHECKSUM: _checksum(values)}
-
-
-def unseal(values: Mapping[str, str]) -> tuple[dict[str, str], bool]:
-    """Return metadata without their checksum, and whether it is right or absent."""
-    # Other programs write metadata without a checksum, which is not held against them.
-    # The checksum covers all entries but itself.
-    bare = {name: value for name, value in values.items() if name != _CHECKSUM}
-    return bare, values.get(_CHECKSUM, _checksum(bare)) == _checksum(bare)
-
-
-def _checksum(values: Mapping[str, str]) -> str:
-    """Return the checksum of metadata, which does not depend on their order."""
-    return f"{zlib.crc32(json.dumps(values, sort_keys=True).encode()):08x}"

@@ -41,9 +41,9 @@ from machines import DEFAULT_MACHINE
 from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording.channels import topic_fields
+from rigtwin.recording.checksum import seal
 from rigtwin.recording.description_path import description_values
 from rigtwin.recording.owner import open_alone
-from rigtwin.recording.records import seal
 from rigtwin.recording.schema import (
     END_RECORD,
     RECORD,

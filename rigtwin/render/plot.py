@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from io import BytesIO
 from pathlib import Path
 
@@ -16,101 +15,14 @@ from rigtwin.errors import RigtwinError
 from rigtwin.files import atomic_write, printable
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import RecordedTest
-from rigtwin.render.style import COLOURS, STYLES, Style
+from rigtwin.render.panels import ASKED, PANELS, RIG_SENSORS, SENSED, Panel, Trace, plain
+from rigtwin.render.style import STYLES, Style
 
-RIG_SENSORS = ("structure_lvdt", "load_cell")
-"""Sensors by which a recording of the suspension rig is recognised."""
 MOST_PANELS = 40
 """Maximum number of panels; the title names how many were left out."""
 LARGEST = 1e100
 """Largest value of a signal that matplotlib's axes can scale."""
 KINDS = (".png", ".svg", ".pdf")
-
-
-@dataclass(frozen=True)
-class Trace:
-    """Line of a panel.
-
-    Attributes
-    ----------
-    label, colour
-        Legend and colour.
-    needs
-        Channels that the line needs.
-    value
-        Function of these channels that returns the line in the panel's unit.
-    """
-
-    label: str
-    colour: str
-    needs: tuple[tuple[str, str], ...]
-    value: Callable[..., Array]
-
-
-@dataclass(frozen=True)
-class Panel:
-    """Panel: lines that share an axis."""
-
-    title: str
-    traces: tuple[Trace, ...]
-
-
-def _millimetres(position: Array) -> Array:
-    """Return a position in mm."""
-    return 1e3 * position
-
-
-def _wheel(structure: Array, travel: Array) -> Array:
-    """Return the wheel's position in mm: plate minus travel."""
-    return 1e3 * (structure - travel)
-
-
-def _plain(signal: Array) -> Array:
-    """Return a signal unchanged."""
-    return signal
-
-
-SENSED, ASKED = COLOURS["measured"], COLOURS["commanded"]
-PANELS = (
-    Panel(
-        "ground, mm",
-        (
-            Trace("measured", SENSED, (("/sensor", "ground_lvdt"),), _millimetres),
-            Trace("commanded", ASKED, (("/command", "ground"),), _millimetres),
-        ),
-    ),
-    Panel(
-        "plate (sprung mass), mm",
-        (
-            Trace("measured", SENSED, (("/sensor", "structure_lvdt"),), _millimetres),
-            Trace("commanded", ASKED, (("/command", "structure"),), _millimetres),
-        ),
-    ),
-    Panel(
-        "suspension travel, mm",
-        (Trace("measured", SENSED, (("/sensor", "suspension_lvdt"),), _millimetres),),
-    ),
-    Panel(
-        "wheel, mm",
-        (
-            Trace(
-                "plate − travel",
-                SENSED,
-                (("/sensor", "structure_lvdt"), ("/sensor", "suspension_lvdt")),
-                _wheel,
-            ),
-        ),
-    ),
-    Panel(
-        "suspension force, N",
-        (
-            Trace("measured", SENSED, (("/sensor", "load_cell"),), _plain),
-            Trace("demanded", ASKED, (("/command", "force"),), _plain),
-        ),
-    ),
-    Panel("motor voltage, V", (Trace("commanded", ASKED, (("/command", "voltage"),), _plain),)),
-)
-"""Panels of the suspension rig from top to bottom. Panels without data are left out."""
 
 
 def _plain_panels(recording: RecordedTest) -> tuple[Panel, ...]:
@@ -125,7 +37,7 @@ def _plain_panels(recording: RecordedTest) -> tuple[Panel, ...]:
         Panel(
             name,
             tuple(
-                Trace(label, colour, ((topic, name),), _plain)
+                Trace(label, colour, ((topic, name),), plain)
                 for topic, (label, colour) in labels.items()
             ),
         )

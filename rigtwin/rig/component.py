@@ -23,7 +23,7 @@ from rigtwin.description.configuration import Configuration
 from rigtwin.models.quarter_car_motion import follow_plates
 from rigtwin.numerics.arrays import Array, interpolate
 from rigtwin.numerics.compiling import kernel
-from rigtwin.simulation.plant import initial_deflection
+from rigtwin.simulation.rig_contacts import initial_deflection
 
 FIXED = 1e12
 """Mass of a carriage that does not move, kg."""

@@ -24,15 +24,9 @@ from rigtwin.rig.component import (
     replay_mechanics,
     replay_motor,
 )
-from rigtwin.signals.noise import (
-    EstimatedMotion,
-    band,
-    estimate_motion,
-    remove_mains,
-    rms,
-    white_noise,
-)
-from rigtwin.simulation.plant import initial_deflection, initial_yield
+from rigtwin.signals.motion import EstimatedMotion, estimate_motion
+from rigtwin.signals.noise import band, remove_mains, rms, white_noise
+from rigtwin.simulation.rig_contacts import initial_deflection, initial_yield
 from rigtwin.simulation.runner import simulate, without_limits
 
 RESOLVED_OVER = 0.03

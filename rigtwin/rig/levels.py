@@ -16,7 +16,7 @@ from rigtwin.components.sensors import sensor_of
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import OWN
 from rigtwin.diagnosis.evidence import Evidence
-from rigtwin.diagnosis.finding import Level
+from rigtwin.diagnosis.gap import Level
 from rigtwin.diagnosis.residual import Residual
 from rigtwin.diagnosis.threads import Threads
 from rigtwin.numerics.arrays import Array

@@ -10,8 +10,9 @@ from rigtwin.components import RigPlant
 from rigtwin.components.gas_spring import GasSpring
 from rigtwin.components.plant import Plant
 from rigtwin.description.configuration import Configuration
-from rigtwin.description.machine import OWN, Machine, ReplayOf
+from rigtwin.description.machine import OWN, Machine
 from rigtwin.description.physics import Columns, Physics, TwinTest
+from rigtwin.description.replay import ReplayOf
 from rigtwin.description.settings import Nothing
 from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
@@ -20,7 +21,7 @@ from rigtwin.recording import Inputs, RecordedTest
 if TYPE_CHECKING:
     from rigtwin.description.mechanism import Mechanism
     from rigtwin.diagnosis.evidence import Evidence
-    from rigtwin.diagnosis.finding import Level
+    from rigtwin.diagnosis.gap import Level
     from rigtwin.diagnosis.residual import Residual
     from rigtwin.hardware.daq.signals import Signals
     from rigtwin.hardware.daq.table import ChannelTable

@@ -18,7 +18,7 @@ from controllers.skyhook import semi_active_damping
 from rigtwin.description.configuration import Configuration
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
-from rigtwin.simulation.plant import initial_deflection
+from rigtwin.simulation.rig_contacts import initial_deflection
 
 SUBSTEPS = 4
 """Steps per tick with a semi-active damper or gas spring. A linear suspension is exact with one."""

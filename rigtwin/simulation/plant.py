@@ -7,15 +7,13 @@ before each timestep.
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import mujoco
-import numpy as np
 
 from controllers import Measurements
 from controllers.compiled import compilable
-from rigtwin.components import GasSpring, RigPlant
+from rigtwin.components import RigPlant
 from rigtwin.components.conditioning import Actuator, ActuatorState, actuator, condition, hold
 from rigtwin.components.cylinder import (
     CylinderModel,
@@ -25,41 +23,11 @@ from rigtwin.components.cylinder import (
     next_position,
     rest_state,
 )
-from rigtwin.components.dry_friction import Friction, breakaway, friction, gap_at
-from rigtwin.components.gas_spring import spring_force
-from rigtwin.components.tyre import SCALE
-from rigtwin.components.yielding import Rod, share_of_load, solve_yielding
-from rigtwin.numerics.arrays import Array
+from rigtwin.components.dry_friction import gap_at
 from rigtwin.numerics.compiling import forward, integrate
 from rigtwin.simulation.mechanics import Handles, build, handles
-
-
-class RigContacts(NamedTuple):
-    """Forces of the mechanics that change with the motion, and their states."""
-
-    changing: bool  # Whether anything but constant friction and a linear tyre acts.
-    rail: Friction  # Dry friction of the rail.
-    rail_gap: Array  # State of the rail's backlash, m, shape (1,).
-    motor: Friction  # Dry friction of the motor.
-    motor_gap: Array  # State of the motor's backlash, m, shape (1,).
-    cogging: float  # Amplitude of the motor's cogging, N.
-    cogging_pitch: float  # Wavelength of the cogging, m.
-    cogging_phase: float  # Phase of the cogging at zero travel, rad.
-    stiffness: float  # Stiffness of the tyre at small deflection, N/m.
-    damping: float  # Damping of the tyre, Ns/m.
-    hardening: float  # Hardening of the tyre, 1/m.
-    hardening_power: float  # Power of the hardening.
-    ground_compliance: float  # Compliance of the ground cylinder, m/N.
-    ground_unloaded: float  # Yield of the ground plate without load, m.
-    ground_lag: float  # Lag of the ground plate's yielding, s.
-    structure_compliance: float  # Compliance of the structure cylinder, m/N.
-    structure_unloaded: float  # Yield of the structure plate without load, m.
-    structure_lag: float  # Lag of the structure plate's yielding, s.
-    mass: float  # Mass of the carriage, kg.
-    rail_viscous: float  # Viscous friction of the rail, Ns/m.
-    motor_viscous: float  # Viscous friction of the motor, Ns/m.
-    gas: GasSpring  # Gas spring parallel to the motor.
-    yielded: Array  # Yield of ground and structure plate, m, shape (2,).
+from rigtwin.simulation.plant_forces import brace, drive, give_way, touch
+from rigtwin.simulation.rig_contacts import RigContacts, contacts, initial_deflection, initial_yield
 
 
 class PlantState(NamedTuple):
@@ -79,77 +47,6 @@ class PlantState(NamedTuple):
     motor_drive: Actuator
     motor_command: ActuatorState
     contacts: RigContacts
-
-
-def contacts(plant: RigPlant, carriage: float, travel: float, preload: float) -> RigContacts:
-    """Return a plant's contacts before anything moves.
-
-    Parameters
-    ----------
-    plant
-        Parameters of the rig.
-    carriage, travel
-        Position of the carriage and travel of the suspension, m.
-    preload
-        Motor force at the start, N.
-
-    Returns
-    -------
-    Contacts
-        Contacts with new states.
-    """
-    rail, motor, tyre = friction(plant.rail), friction(plant.motor), plant.tyre
-    compliances = plant.ground_cylinder.compliance, plant.structure_cylinder.compliance
-    unloaded = unloaded_yield(plant)
-    forces = (tyre.hardening, plant.motor.cogging, *compliances, plant.gas_spring.force)
-    return RigContacts(
-        changing=rail.changing or motor.changing or any(forces),
-        rail=rail,
-        rail_gap=gap_at(carriage),
-        motor=motor,
-        motor_gap=gap_at(travel),
-        cogging=plant.motor.cogging,
-        cogging_pitch=plant.motor.cogging_pitch,
-        cogging_phase=plant.motor.cogging_phase,
-        stiffness=tyre.stiffness,
-        damping=tyre.damping,
-        hardening=tyre.hardening,
-        hardening_power=tyre.hardening_power,
-        ground_compliance=compliances[0],
-        ground_unloaded=unloaded[0],
-        ground_lag=plant.ground_cylinder.yield_lag,
-        structure_compliance=compliances[1],
-        structure_unloaded=unloaded[1],
-        structure_lag=plant.structure_cylinder.yield_lag,
-        mass=plant.carriage.mass,
-        rail_viscous=plant.rail.viscous,
-        motor_viscous=plant.motor.viscous,
-        gas=plant.gas_spring,
-        yielded=np.array(initial_yield(plant, preload)),
-    )
-
-
-def initial_deflection(plant: RigPlant, preload: float) -> float:
-    """Return the tyre's deflection at the start, m.
-
-    The tyre carries the motor's preload, N, and the force of the extended gas spring.
-    """
-    return (preload + plant.gas_spring.force) / plant.tyre.stiffness
-
-
-def initial_yield(plant: RigPlant, preload: float) -> tuple[float, float]:
-    """Return the yield of ground and structure plate at the start, m, under a preload, N."""
-    tyre, unloaded = preload + plant.gas_spring.force, unloaded_yield(plant)
-    return (
-        unloaded[0] - plant.ground_cylinder.compliance * tyre,
-        unloaded[1] + plant.structure_cylinder.compliance * preload,
-    )
-
-
-def unloaded_yield(plant: RigPlant) -> tuple[float, float]:
-    """Return the yield of ground and structure plate without load, m."""
-    ground, structure = plant.ground_cylinder, plant.structure_cylinder
-    return ground.compliance * ground.zero_load, -structure.compliance * structure.zero_load
 
 
 class Simulation:
@@ -245,117 +142,6 @@ def continue_motion(before: Simulation, after: Simulation) -> None:
     carriage = mechanics.qpos[mechanics.carriage]
     new_state.contacts.rail_gap[:] = gap_at(carriage)
     new_state.contacts.motor_gap[:] = gap_at(mechanics.qpos[mechanics.structure] - carriage)
-
-
-@compilable
-def drive(mechanics: Handles, joint: int, position: float, position_ahead: float) -> None:
-    """Prescribe a joint's motion over the coming timestep, from `position` to the one ahead, m."""
-    mechanics.qpos[joint] = position
-    mechanics.qvel[joint] = (position_ahead - position) / mechanics.timestep
-
-
-@compilable
-def motor_force(mechanics: Handles) -> float:
-    """Return the motor's force without its friction, N."""
-    return mechanics.motor_constant * mechanics.activation[0] + mechanics.motor_bias[0]
-
-
-@compilable
-def brace(mechanics: Handles) -> None:
-    """Hold the structure plate against the motor's force, as its cylinder does."""
-    # Otherwise the motor's dry friction would have to bear a part of that force.
-    mechanics.applied[mechanics.structure] = -motor_force(mechanics)
-
-
-@compilable
-def stiffness_ratio(now: RigContacts, deflection: float) -> float:
-    """Return the tyre's secant stiffness at a deflection, m, as a factor on the nominal one."""
-    if now.hardening == 0.0 or deflection <= 0.0:
-        return 1.0
-    return max(
-        1.0 + now.hardening * deflection * (deflection / SCALE) ** (now.hardening_power - 1.0), 0.0
-    )
-
-
-@compilable
-def cogging_force(now: RigContacts, travel: float) -> float:
-    """Return the motor's cogging at a travel of the suspension, m: N."""
-    if now.cogging == 0.0:
-        return 0.0
-    return now.cogging * math.sin(2.0 * math.pi * travel / now.cogging_pitch + now.cogging_phase)
-
-
-@compilable
-def touch(mechanics: Handles, now: RigContacts) -> None:
-    """Write dry friction, cogging and tyre stiffness of the current motion into the mechanics."""
-    if not now.changing:
-        return
-    carriage, velocity = mechanics.qpos[mechanics.carriage], mechanics.qvel[mechanics.carriage]
-    travel = mechanics.qpos[mechanics.structure] - carriage
-    sliding = mechanics.qvel[mechanics.structure] - velocity
-    load = mechanics.motor_constant * mechanics.activation[0]
-    # MuJoCo's dry friction is symmetric: the mean of both directions goes there, and half their
-    # difference is an applied force.
-    forward, backward = breakaway(now.rail, now.rail_gap, carriage, velocity, load)
-    mechanics.rail_friction[0] = 0.5 * (forward + backward)
-    mechanics.applied[mechanics.carriage] = 0.5 * (backward - forward)
-    if now.gas.force > 0.0:
-        mechanics.applied[mechanics.carriage] -= spring_force(now.gas, -travel)
-    forward, backward = breakaway(now.motor, now.motor_gap, travel, sliding, load)
-    mechanics.motor_friction[0] = 0.5 * (forward + backward)
-    mechanics.motor_bias[0] = cogging_force(now, travel) + 0.5 * (backward - forward)
-    deflection = max(mechanics.qpos[mechanics.ground] - carriage, 0.0)
-    mechanics.tyre[0] = -mechanics.tyre_scale * now.stiffness * stiffness_ratio(now, deflection)
-
-
-@compilable
-def give_way(
-    mechanics: Handles, now: RigContacts, ground: float, structure: float
-) -> tuple[float, float]:
-    """Return the yield of ground and structure plate one timestep ahead, m.
-
-    MuJoCo takes the plates' motion as prescribed, so their loads are predicted here.
-
-    Parameters
-    ----------
-    mechanics
-        State before the timestep.
-    now
-        Contacts before the timestep; `yielded` is not changed.
-    ground, structure
-        Velocities of the plates without load, m/s.
-
-    Returns
-    -------
-    tuple
-        Yield of the ground plate and of the structure plate, m.
-    """
-    h = mechanics.timestep
-    v = mechanics.qvel[mechanics.carriage]
-    place = mechanics.qpos[mechanics.carriage]
-    load, inertia, tyre = motor_force(mechanics), now.mass + h * now.rail_viscous, 0.0
-    deflection = mechanics.qpos[mechanics.ground] - place
-    share = share_of_load(now.ground_compliance, now.ground_lag, h)
-    unloaded = ground + (now.ground_unloaded - now.yielded[0]) / (now.ground_lag + h)
-    if deflection > 0.0:
-        slope = now.stiffness * stiffness_ratio(now, deflection)
-        tyre = slope * (deflection + h * (unloaded - ground)) + now.damping * (unloaded - v)
-        tyre = max(tyre / (1.0 + share * (slope * h + now.damping)), 0.0)
-    ground_ahead = now.yielded[0] + h * (unloaded - ground - share * tyre)
-    if now.structure_compliance == 0.0:
-        return ground_ahead, 0.0
-    share = share_of_load(now.structure_compliance, now.structure_lag, h)
-    travel = mechanics.qpos[mechanics.structure] - place
-    sliding = mechanics.qvel[mechanics.structure] - v
-    up, down = breakaway(now.rail, now.rail_gap, place, v, load)
-    forward, backward = breakaway(now.motor, now.motor_gap, travel, sliding, load)
-    # The motor's force already contains the difference of friction between both directions.
-    load -= 0.5 * (backward - forward)
-    push = tyre - (spring_force(now.gas, -travel) if now.gas.force > 0.0 else 0.0)
-    free = structure + (now.structure_unloaded - now.yielded[1]) / (now.structure_lag + h)
-    rod = Rod(free, share, load, now.motor_viscous, forward, backward)
-    _, cell = solve_yielding(rod, now.mass * v + h * push, inertia, h, (h * up, h * down))
-    return ground_ahead, now.yielded[1] + h * (free - structure + share * cell)
 
 
 @compilable

@@ -18,8 +18,9 @@ from rigtwin.description.machine import OWN
 from rigtwin.description.settings import Safety
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Writer
-from rigtwin.simulation.loop import BLOCK, Block, Tick, run, run_compiled
-from rigtwin.simulation.safety import Trip, explain_trip
+from rigtwin.simulation.compiled_loop import run_compiled
+from rigtwin.simulation.loop import BLOCK, Block, Tick, run
+from rigtwin.simulation.trip import Trip, explain_trip
 from rigtwin.simulation.twin import Twin
 
 AT_ONCE = 10 * BLOCK

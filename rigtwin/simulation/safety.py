@@ -7,7 +7,6 @@ twin's compiled loop and the rig's loop call the same one.
 from __future__ import annotations
 
 import math
-from enum import IntEnum
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +17,7 @@ from controllers.force import MOTOR_CONSTANT
 from rigtwin.components import RigPlant
 from rigtwin.description.settings import Safety
 from rigtwin.numerics.arrays import Array
+from rigtwin.simulation.trip import Trip
 
 MOTOR_LAG = RigPlant().motor.time_constant
 """Time constant of the motor's force behind its voltage, s."""
@@ -26,25 +26,6 @@ LEADING = 1.5
 VELOCITY_SPAN = 10
 """Ticks over which a velocity is averaged before it is compared with its limit, so that noise of
 single samples does not count as motion."""
-
-
-class Trip(IntEnum):
-    """Limit that ended a test early."""
-
-    NONE = 0
-    STRUCTURE = 1
-    FORCE = 2
-    TRAVEL = 3
-    NOT_A_NUMBER = 4
-    GROUND = 5
-    VELOCITY = 6
-    JUMP = 7
-    STUCK = 8
-    FOLLOWING = 9
-    COMMAND = 10
-    COMMAND_RATE = 11
-    WHEEL = 12
-    MOTOR = 13
 
 
 (
@@ -292,46 +273,3 @@ def find_arming_obstacle(limits: Safety, measured: Measurements) -> str | None:
                 f"{100 * share:.0f} % of its limit"
             )
     return None
-
-
-def explain_trip(trip: Trip, limits: Safety, column: int = 0) -> str:
-    """Explain a trip in one line for the operator.
-
-    Parameters
-    ----------
-    trip
-        Limit that ended the test.
-    limits
-        Limits of the test.
-    column
-        Column of `Measurements`, or from 4 on of `Commands`.
-
-    Returns
-    -------
-    str
-        Explanation with limit and unit.
-    """
-    name = (*Measurements._fields, *(f"command of {field}" for field in Commands._fields))[column]
-    lvdt, rate = ("m", limits.lvdt_rate) if column != 3 else ("N", limits.force_rate)
-    command, change = ("m", limits.command_rate) if column != 7 else ("V", limits.voltage_rate)
-    error, following = ("m", limits.following) if column != 3 else ("N", limits.following_force)
-    return {
-        Trip.NONE: "completed",
-        Trip.STRUCTURE: f"trip: |structure_lvdt| above {limits.structure:g} m",
-        Trip.FORCE: f"trip: |load_cell| above {limits.force:g} N",
-        Trip.TRAVEL: f"trip: |suspension_lvdt| above {limits.travel:g} m, the motor's stroke",
-        Trip.NOT_A_NUMBER: f"trip: {name} is not a finite number",
-        Trip.GROUND: f"trip: |ground_lvdt| above {limits.ground:g} m",
-        Trip.VELOCITY: f"trip: suspension_lvdt moves faster than {limits.velocity:g} m/s",
-        Trip.JUMP: f"trip: {name} jumps by more than {rate:g} {lvdt}/s allow between two ticks: "
-        "sensor or cable",
-        Trip.STUCK: f"trip: {name} gave {limits.stuck:g} times the same reading: "
-        "sensor stuck or cable off",
-        Trip.FOLLOWING: f"trip: {name} is more than {following:g} {error} off its command",
-        Trip.COMMAND: f"trip: {name} is beyond its limit",
-        Trip.WHEEL: f"trip: the three LVDTs put the wheel over {limits.wheel:g} m off the ground "
-        "plate: one of them is wrong",
-        Trip.MOTOR: f"trip: load_cell is over {limits.motor:g} N off the force of the motor's "
-        "voltage: sensor or amplifier",
-        Trip.COMMAND_RATE: f"trip: {name} changes faster than {change:g} {command}/s",
-    }[trip]

@@ -34,7 +34,8 @@ from rigtwin.description.configuration import Configuration
 from rigtwin.description.control import set_up
 from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
-from rigtwin.simulation.safety import Trip, empty_memory, judge_limits
+from rigtwin.simulation.safety import empty_memory, judge_limits
+from rigtwin.simulation.trip import Trip
 from rigtwin.simulation.twin import Twin
 from rigtwin.studies.actions import Actions, suspension
 

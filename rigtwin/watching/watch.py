@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Machine
-from rigtwin.diagnosis.data_checks import channels, require_fit
+from rigtwin.diagnosis.data_checks import require_fit
 from rigtwin.diagnosis.evidence import Evidence
+from rigtwin.diagnosis.unit_checks import channels
 from rigtwin.errors import RigtwinError
 from rigtwin.recording import RecordedTest
 from rigtwin.signals.noise import white_noise

@@ -11,15 +11,8 @@ import pytest
 from rigtwin.components import Effect, RigPlant, find
 from rigtwin.diagnosis.blocks import block_products
 from rigtwin.diagnosis.fit import Fit, with_values
-from rigtwin.diagnosis.scoring import (
-    Scored,
-    Scorer,
-    _cross_validate,
-    _folds,
-    _reach,
-    _standard_errors,
-    _together,
-)
+from rigtwin.diagnosis.left_out_blocks import _folds, cross_validate, standard_errors
+from rigtwin.diagnosis.scoring import Scored, Scorer, _reach, _together
 from tests.engine.linear import PLANT, LinearEvidence, space_of
 
 RANDOM = np.random.default_rng(12)
@@ -67,7 +60,7 @@ def test_what_is_left_out_is_predicted_by_a_fit_to_the_rest(recordings, settled,
     still = -np.linalg.solve(whole, flat.T @ data + pull)
     assert np.allclose(still, 0.0, atol=1e-9) == settled
     expected = np.full((recordings, 2, 3, BLOCKS), 1.7 * SAMPLES)
-    levels, inside = _cross_validate(products_of(rows), expected, weights, pull)
+    levels, inside = cross_validate(products_of(rows), expected, weights, pull)
     blocks = np.arange(BLOCKS)[None, :] + 0 * np.arange(recordings)[:, None]
     parts = blocks % 5 if recordings == 1 else np.arange(recordings)[:, None] + 0 * blocks
     power = np.zeros((recordings, 2, 3))
@@ -86,12 +79,12 @@ def test_what_is_left_out_is_predicted_by_a_fit_to_the_rest(recordings, settled,
 def test_a_fit_without_effects_leaves_out_what_it_leaves():
     rows = rows_of(1)[..., 2:]
     expected = np.full((1, 2, 3, BLOCKS), 2.0 * SAMPLES)
-    levels, inside = _cross_validate(products_of(rows), expected, np.zeros(0), np.zeros(0))
+    levels, inside = cross_validate(products_of(rows), expected, np.zeros(0), np.zeros(0))
     assert levels == pytest.approx(inside)
     assert levels == pytest.approx(by_band(rows[..., 0] ** 2) / (2.0 * SAMPLES * BLOCKS))
-    none, _ = _cross_validate(products_of(rows), 0.0 * expected, np.zeros(0), np.zeros(0))
+    none, _ = cross_validate(products_of(rows), 0.0 * expected, np.zeros(0), np.zeros(0))
     assert not np.any(none)
-    little, _ = _cross_validate(products_of(rows), 1e-9 * expected, np.zeros(0), np.zeros(0))
+    little, _ = cross_validate(products_of(rows), 1e-9 * expected, np.zeros(0), np.zeros(0))
     assert little == pytest.approx(1e9 * levels)
 
 
@@ -110,7 +103,7 @@ def test_blocks_of_one_recording_interleave_and_several_recordings_take_turns():
 
 @pytest.mark.parametrize("scale", [0.5, 3.0])
 @pytest.mark.parametrize("uneven", [0.0, 4.0])
-def test_standard_errors_are_the_larger_of_the_formal_and_the_sandwich_ones(scale, uneven):
+def teststandard_errors_are_the_larger_of_the_formal_and_the_sandwich_ones(scale, uneven):
     """Formal: (JᵀJ + P)⁻¹ times the excess of the residual's power; White's sandwich over
     blocks."""
     rows = rows_of(1)
@@ -125,9 +118,9 @@ def test_standard_errors_are_the_larger_of_the_formal_and_the_sandwich_ones(scal
     spread = gradients.T @ gradients * BLOCKS / (BLOCKS - 2)
     sandwich = np.diag(inverse @ spread @ inverse)
     variance = np.maximum(sandwich, excess * np.diag(inverse))
-    found = _standard_errors(products_of(rows), expected, prior, 1)
+    found = standard_errors(products_of(rows), expected, prior, 1)
     assert found == pytest.approx(np.sqrt(variance[:1]), rel=1e-6)
-    both = _standard_errors(products_of(rows), expected, prior, 2)
+    both = standard_errors(products_of(rows), expected, prior, 2)
     assert both == pytest.approx(np.sqrt(variance), rel=1e-6)
     assert bool(sandwich[0] > excess * inverse[0, 0]) or uneven == 0.0
 

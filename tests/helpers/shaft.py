@@ -17,7 +17,8 @@ from rigtwin.components.plant import Plant
 from rigtwin.components.scales import Motion
 from rigtwin.components.sensors import apply_sensor
 from rigtwin.description.configuration import Configuration
-from rigtwin.description.machine import Machine, ReplayOf
+from rigtwin.description.machine import Machine
+from rigtwin.description.replay import ReplayOf
 from rigtwin.joints.physics import IndependentJoints
 from rigtwin.models.model import Model
 from rigtwin.numerics.arrays import Array

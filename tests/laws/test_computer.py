@@ -17,7 +17,7 @@ from tests.laws.written import law_of
 @pytest.mark.skipif(INTERPRETED, reason="the running rig calls MuJoCo from compiled code")
 @pytest.mark.parametrize("share", [0.0, 0.1, 0.3])
 def test_at_a_missed_tick_all_outputs_stay_as_they_are(share):
-    from rigtwin.simulation.loop import run_compiled
+    from rigtwin.simulation.compiled_loop import run_compiled
     from rigtwin.simulation.twin import Twin
 
     plant = RigPlant(computer=Computer(missed_ticks=share))

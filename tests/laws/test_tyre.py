@@ -7,7 +7,8 @@ import pytest
 
 from rigtwin.components import RigPlant, Tyre
 from rigtwin.components.tyre import tyre_force
-from rigtwin.simulation.plant import contacts, stiffness_ratio
+from rigtwin.simulation.plant_forces import stiffness_ratio
+from rigtwin.simulation.rig_contacts import contacts
 from tests.laws.written import law_of
 
 TYRES = [

@@ -6,7 +6,8 @@ import numpy as np
 
 from rigtwin.components.sensors import sensor_of, start_transducer, transduce, transducer
 from rigtwin.description.configuration import Configuration
-from rigtwin.description.machine import Machine, Row
+from rigtwin.description.machine import Machine
+from rigtwin.description.replay import Row
 from rigtwin.hardware.daq.conversion import conversion, to_bits, to_values, to_volts
 from rigtwin.hardware.daq.table import ChannelTable
 from rigtwin.models.demands import list_sensors

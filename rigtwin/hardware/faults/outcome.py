@@ -12,7 +12,7 @@ from rigtwin.hardware.faults.bench import FaultyBench
 from rigtwin.hardware.faults.kinds import SIGNALS, FaultKind
 from rigtwin.hardware.session.test import Test
 from rigtwin.recording import load
-from rigtwin.recording.reader import transitions
+from rigtwin.recording.recorded_test import transitions
 
 
 @dataclass(frozen=True)

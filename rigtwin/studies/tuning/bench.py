@@ -10,7 +10,7 @@ import numpy as np
 
 from rigtwin.description.configuration import Configuration
 from rigtwin.numerics.arrays import Array
-from rigtwin.simulation.safety import Trip
+from rigtwin.simulation.trip import Trip
 from rigtwin.studies.sweep import Store, Workers, run_jobs
 from rigtwin.studies.tuning.measures import Measure
 from rigtwin.studies.tuning.parameter import Settings

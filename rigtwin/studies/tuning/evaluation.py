@@ -13,7 +13,7 @@ import numpy as np
 from scipy.stats import binom
 
 from rigtwin.numerics.arrays import Array
-from rigtwin.simulation.safety import Trip
+from rigtwin.simulation.trip import Trip
 from rigtwin.studies.tuning.bench import Bench, quantile
 from rigtwin.studies.tuning.measures import Measure
 from rigtwin.studies.tuning.parameter import Settings

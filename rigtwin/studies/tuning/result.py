@@ -13,6 +13,7 @@ import numpy as np
 
 from rigtwin.description.posterior import Posterior
 from rigtwin.studies.tuning.bench import Bench, Score
+from rigtwin.studies.tuning.candidates import Candidate, TuningSearch
 from rigtwin.studies.tuning.evaluation import SettingsComparison, evaluate
 from rigtwin.studies.tuning.parameter import Settings, set_values
 from rigtwin.studies.tuning.scenario import (
@@ -22,7 +23,7 @@ from rigtwin.studies.tuning.scenario import (
     calibrated_rig,
     draw_scenarios,
 )
-from rigtwin.studies.tuning.search import Candidate, TuningSearch, find_best, find_front
+from rigtwin.studies.tuning.search import find_best, find_front
 from rigtwin.studies.tuning.study import Study
 
 TUNED, BEFORE, TUNED_NOMINAL = "tuned", "before", "tuned on the nominal twin"

@@ -19,8 +19,8 @@ from rigtwin.numerics.arrays import RUNAWAY, Array
 from rigtwin.simulation.experiment import Experiment
 from rigtwin.simulation.peaks import peaks
 from rigtwin.simulation.runner import SimulationResult
-from rigtwin.simulation.safety import Trip
 from rigtwin.simulation.structure_motion import models_output
+from rigtwin.simulation.trip import Trip
 from rigtwin.studies.tuning.measures import Measure, RigTrial, Trial
 
 LIMITS, TRIP = "limits", "trip"

@@ -1,0 +1,123 @@
+"""Components and replays that follow from the joints of a model."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from rigtwin.description.joint_elements import (
+    body_of,
+    identifier,
+    sensor_on,
+)
+from rigtwin.description.mechanism import Mechanism
+
+FREE = [
+    "coulomb",
+    "viscous",
+    "offset",
+    "stiffness",
+    "stribeck",
+    "load_friction",
+    "position_force",
+    "end_stops",
+]
+"""Effects at coupled joints that are free to move."""
+FREE_SERVO = [
+    "gains",
+    "position_gain",
+    "damping_gain",
+    "delay",
+    "lag",
+    "force_limit",
+    "rate_limit",
+    "deadband",
+]
+"""Effects of servos that move coupled joints."""
+
+
+@dataclass
+class Implied:
+    """Tables that a description implies.
+
+    Attributes
+    ----------
+    components
+        Component name → table.
+    replays
+        Tables of the replays.
+    """
+
+    components: dict[str, dict[str, Any]] = field(default_factory=dict)
+    replays: list[Mapping[str, Any]] = field(default_factory=list)
+
+
+def add_free_joints(
+    joints: Sequence[str],
+    mechanism: Mechanism,
+    tables: dict[str, dict[str, Any]],
+    free: Sequence[str],
+) -> None:
+    """Add the effects and links of coupled joints whose motion follows from forces."""
+    for joint in joints:
+        tables[identifier(joint)]["effects"] = FREE
+    # Without a force from an actuator, only ratios of friction and masses to one of the masses can
+    # be seen. One known force is enough, since coupled joints pass it on.
+    add_links(mechanism, joints[1:] if free else joints, ["mass", "payload"], tables)
+
+
+def sensor_table(mechanism: Mechanism, joint: str, measured: str) -> dict[str, Any]:
+    """Return the table of a sensor: one of the MJCF, or one without an element of its own."""
+    known = sensor_on(mechanism, joint, measured)
+    return {"sensor": known} if known else {"joint": joint, "type": f"{measured} sensor"}
+
+
+def add_tendons(
+    mechanism: Mechanism, joints: Sequence[str], tables: dict[str, dict[str, Any]]
+) -> None:
+    """Add the fixed tendons with friction that couples joints, such as those of a wrist."""
+    for tendon in mechanism.names("tendon"):
+        # A tendon that passes another joint too would see a motion that is not measured.
+        along = [joint for joint, _ in mechanism.acts_on("tendon", tendon)]
+        if along and set(along) <= set(joints):
+            tables[identifier(tendon)] = {"tendon": tendon, "effects": ["coulomb", "viscous"]}
+
+
+def add_rotor(joint: str, tables: dict[str, dict[str, Any]]) -> None:
+    """Add the rotor that turns with a joint: data sheets of robots seldom state its inertia."""
+    name = f"{identifier(joint)}_rotor"
+    # A joint or a body of the model may have that name already.
+    name = f"{name}_inertia" if name in tables else name
+    tables[name] = {"joint": joint, "type": "rotor", "effects": ["armature"]}
+
+
+def add_links(
+    mechanism: Mechanism,
+    joints: Sequence[str],
+    last: Sequence[str],
+    tables: dict[str, dict[str, Any]],
+) -> None:
+    """Add the rigid bodies that joints carry: their masses, and the effects of the last one."""
+    for joint in joints:
+        _add_link(mechanism, joint, last if joint == joints[-1] else ["mass"], tables)
+
+
+def _add_link(
+    mechanism: Mechanism, joint: str, effects: Sequence[str], tables: dict[str, dict[str, Any]]
+) -> None:
+    """Add the rigid body that a joint moves, if it has a name."""
+    body = body_of(mechanism, joint)
+    if body:
+        name = identifier(body)
+        name = f"{name}_body" if name in tables else name
+        tables[name] = {"body": body, "type": "body", "effects": list(effects)}
+
+
+def add_mass(mechanism: Mechanism, joint: str, tables: dict[str, dict[str, Any]]) -> None:
+    """Add the mass that moves with a joint that is replayed alone."""
+    body = body_of(mechanism, joint)
+    # A body with several joints moves with more than this one.
+    if body and mechanism.joint_of("body", body) == joint:
+        name = identifier(body)
+        tables[f"{name}_mass" if name in tables else name] = {"body": body, "effects": ["mass"]}

@@ -1,0 +1,116 @@
+"""Forces on the joints of a machine within one step."""
+
+from __future__ import annotations
+
+import math
+
+from controllers.compiled import inlined
+from rigtwin.components import Guide
+from rigtwin.components.dry_friction import dry_limits
+from rigtwin.components.guide_force import damping, position_force, quick_damping
+from rigtwin.components.guide_step import GuideStep
+from rigtwin.components.mount import MountState, give_way
+from rigtwin.components.servo import pull, push
+from rigtwin.models.forward_arrays import GuideContacts, Servos, State, StepInputs, WorkSpace
+from rigtwin.models.joint_motion import SHORTEST
+
+
+@inlined
+def push_coordinates(inputs: StepInputs, number: int, work: WorkSpace) -> None:
+    """Add up the force actuators' forces over step `number`, and those up to it."""
+    # The sensors at this step see the force of the command held before it; the step from here is
+    # driven by the mean of both.
+    for a in range(len(inputs.levers)):
+        earlier = inputs.pushes[a, max(number - 1, 0)]
+        now = 0.5 * (earlier + inputs.pushes[a, number])
+        for i in range(len(work.pushed)):
+            work.pushed[i] += inputs.levers[a, i] * now
+            work.transmitted[i] += inputs.levers[a, i] * now
+            work.earlier_push[i] += inputs.levers[a, i] * earlier
+
+
+@inlined
+def serve(servos: Servos, state: State, number: int, h: float, work: WorkSpace) -> None:
+    """Add the servos' forces over step `number`, but for the implicit share of their damping."""
+    size = len(work.pushed)
+    for a in range(len(servos.laws)):
+        law = servos.laws[a]
+        position_at, rate_mid, rate_now = servos.zero[a], 0.0, 0.0
+        for i in range(size):
+            position_at += servos.levers[a, i] * state.place[i]
+            rate_mid += servos.levers[a, i] * work.midspeed[i]
+            rate_now += servos.levers[a, i] * state.speed[i]
+        earlier = servos.commands[a, max(number - 1, 0)]
+        now = 0.5 * (earlier + servos.commands[a, number])
+        force, held_by = pull(law, now, position_at), law.damping_gain
+        if abs(force - held_by * rate_now) > law.limit:
+            # At its limit a servo damps nothing.
+            force = math.copysign(law.limit, force - held_by * rate_now)
+            held_by = 0.0
+        # Midpoint rule, or more implicit where the damping would make that oscillate.
+        weight = 0.5
+        if held_by > 0.0:
+            mass = servos.inertia[a] / h
+            weight = max(0.5, 1.0 - mass / held_by)
+        force -= (1.0 - weight) * held_by * rate_now
+        work.held_by[a], work.weights[a] = held_by, weight
+        before = push(law, earlier, position_at, rate_mid)
+        whole = force - weight * held_by * rate_now
+        for i in range(size):
+            work.pushed[i] += servos.levers[a, i] * force
+            work.transmitted[i] += servos.levers[a, i] * whole
+            work.earlier_push[i] += servos.levers[a, i] * before
+
+
+@inlined
+def hold_back(
+    contacts: GuideContacts, g: int, guide: Guide, load: float, h: float, state: State, place: float
+) -> float:
+    """Move guide `g` behind its compliant mount, and return its force on the machine, N.
+
+    The mount decouples the guide: its force follows from the position alone, and is explicit.
+    """
+    share, dry = h / (guide.relaxation + h), contacts.dry[g]
+    guide_step = GuideStep(guide, dry, contacts.springs[g], contacts.rests[g], h, share)
+    before = MountState(state.inner[g], state.within[g], state.slider[g], state.viscous[g])
+    after, force = give_way(guide_step, before, load, place)
+    state.inner[g], state.within[g] = after.inner, after.speed
+    state.slider[g], state.viscous[g] = after.slider, after.viscous
+    return force
+
+
+@inlined
+def resist_explicitly(
+    contacts: GuideContacts, inputs: StepInputs, state: State, tick: int, h: float, work: WorkSpace
+) -> None:
+    """Find the part of the guides' forces that does not depend on the coming velocity."""
+    for g in range(len(contacts.springs)):
+        work.guide_force[g] = inputs.guide_disturbance[g, tick]
+        work.damped[g] = work.implicit[g] = 0.0
+        if not contacts.acts[g]:
+            continue
+        guide = contacts.guides[g]
+        place, rate, load, along_squared = contacts.zero[g], 0.0, 0.0, 0.0
+        for i in range(len(work.pushed)):
+            along = contacts.along[g, i]
+            place += along * state.place[i]
+            rate += along * state.speed[i]
+            load += along * work.transmitted[i]
+            along_squared += along * along
+        work.place[g], work.rate[g] = place, rate
+        # Force per unit of the guide's own coordinate, for load-dependent friction.
+        load /= along_squared
+        work.mounted[g] = guide.mount_compliance * contacts.inertia[g] > SHORTEST * h * h
+        if work.mounted[g]:
+            work.guide_force[g] -= hold_back(contacts, g, guide, load, h, state, place)
+            continue
+        share = h / (guide.relaxation + h)
+        damped = share * damping(guide, rate) + quick_damping(guide, place, rate)
+        mass = contacts.inertia[g] / h
+        implicit = max(0.5, 1.0 - mass / damped) if damped > 0.0 else 0.5
+        work.damped[g], work.implicit[g] = damped, implicit
+        work.guide_force[g] -= position_force(guide, place, contacts.rests[g])
+        work.guide_force[g] -= (1.0 - share) * state.viscous[g]
+        work.guide_force[g] -= (1.0 - implicit) * damped * rate
+        friction = contacts.dry[g]
+        work.forward[g], work.backward[g] = dry_limits(friction, rate, load)
