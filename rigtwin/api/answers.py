@@ -10,6 +10,7 @@ from rigtwin.api.describing import describe, needs_description, record_logs
 from rigtwin.api.machines import described_machine, machine_of
 from rigtwin.api.recordings import resolve_recording
 from rigtwin.api.twin import Settings, names_of, require_unrecorded, twin_of
+from rigtwin.describing.force_view import judge_by_forces, with_forces
 from rigtwin.description.machine import Machine
 from rigtwin.diagnosis.change import Changes
 from rigtwin.diagnosis.changes import find_changes
@@ -25,6 +26,9 @@ from rigtwin.studies.friction_spikes import Calibration
 
 Recorded = reader.RecordedTest | str | Path
 """A recording, or the path of one."""
+MOST = 0.5
+"""Share of the gap below which an answer about a driven motion is poor, and which one about the
+forces along it must close to take its place."""
 LEAST_DETECTED, MOST_FALSE = 0.8, 0.1
 """Least share of reversals that a friction compensator detects, and most false steps per reversal,
 on the recording it was identified from."""
@@ -111,16 +115,61 @@ def diagnose(
     require_unrecorded(settings, described, [*data.recordings, *data.held_out])
     base = twin_of(described, settings, without)
     tests = [find_experiment(described, name) for name in described.next_tests]
-    return find_reasons(
+    thresholds = replace(STANDARD, effort=effort)
+    diagnosis = find_reasons(
         described,
         data.recordings,
         base,
         data.held_out,
         tests,
         progress=progress,
-        thresholds=replace(STANDARD, effort=effort),
+        thresholds=thresholds,
         first_look=first_look,
     )
+    # Settings and exclusions name components, which the other view does not have.
+    stated = bool(settings or without or exclude)
+    if stated or _closed_share(diagnosis) >= MOST or (view := _by_forces(data)) is None:
+        return diagnosis
+    other = find_reasons(
+        view.machine,
+        view.recordings,
+        None,
+        view.held_out,
+        (),
+        progress=progress,
+        thresholds=thresholds,
+    )
+    return _with_note(other, diagnosis) if _closed_share(other) >= MOST else diagnosis
+
+
+def _closed_share(diagnosis: Diagnosis) -> float:
+    """Return the share of the gap that an answer closes, 1 where there is no gap to close."""
+    if diagnosis.verdict not in ("unknown", "partly explained") or diagnosis.gap is None:
+        return 1.0
+    return diagnosis.gap.shrinkage_held_out.value if diagnosis.effects else 0.0
+
+
+def _by_forces(data: DiagnosisData) -> DiagnosisData | None:
+    """Return logs of force commands with the motion prescribed; None for any other recordings."""
+    origin = getattr(data.recordings[0], "origin", None)
+    view = judge_by_forces(origin) if origin is not None else None
+    if view is None:
+        return None
+    fitted, judged = (
+        tuple(with_forces(origin, view, recording) for recording in recordings)
+        for recordings in (data.recordings, data.held_out)
+    )
+    return DiagnosisData(view.machine, fitted, judged)
+
+
+def _with_note(diagnosis: Diagnosis, before: Diagnosis) -> Diagnosis:
+    """Return an answer with a note on the view that it replaces."""
+    note = (
+        "judged by the forces along the measured motion: predicted from the forces, the motion "
+        f"departs from the measured one, and the answer would be {before.verdict!r}"
+    )
+    answer = replace(diagnosis.answer, notes=(note, *diagnosis.answer.notes))
+    return replace(diagnosis, answer=answer)
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from rigtwin.api.recordings import Recording, with_machine
@@ -156,4 +157,4 @@ def record_logs(described: Described, logs: Sequence[Log | reader.RecordedTest])
         Logs with the same columns.
     """
     tests = [test for log in logs for test in described.records(log_files(log))]
-    return [with_machine(test, described.machine) for test in tests]
+    return [replace(with_machine(test, described.machine), origin=described) for test in tests]

@@ -12,6 +12,7 @@ import numpy as np
 
 from rigtwin.api.machines import machine_of, resolve_machine
 from rigtwin.api.twin import Settings, twin_of
+from rigtwin.describing.described import Described
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Machine
 from rigtwin.errors import RigtwinError
@@ -30,6 +31,8 @@ class Recording(reader.RecordedTest):
 
     described: Machine | None = field(default=None, repr=False)
     """Machine of the recording, if it was stated when the recording was loaded or made."""
+    origin: Described | None = field(default=None, repr=False)
+    """How the log was read that the recording was made from. None of any other recording."""
     report: tuple[str, ...] = field(default=(), repr=False)
     """Lines about the imported data: gaps, units, columns used. Empty unless it was imported."""
 

@@ -128,6 +128,35 @@ def _velocity(position: Array, time: Array) -> Array:
     return np.pad(inner, reach, mode="edge")
 
 
+def commanded_force(log: Log, joint: str) -> LogSignal | None:
+    """Return the force that a command stands for; None where it is unknown.
+
+    Parameters
+    ----------
+    log
+        The log. Questions are added to it.
+    joint
+        Joint that the actuator pushes.
+    """
+    actuator = actuator_on(log.mechanism, joint)
+    if actuator is None or log.mechanism.positions(actuator):
+        return None
+    known = [q for q in command_quantities(log.mechanism, joint) if log.slots.has(joint, q)]
+    if not known or not takes_force(log.mechanism, joint):
+        return None
+    signal, constant = _control(log, joint, known[0]), actuator_constant(log.mechanism, actuator)
+    if signal is None or (signal.formula and constant != 1.0):
+        return None
+    si = SI[JointQuantity.FORCE][log.mechanism.turns(joint)]
+    return replace(
+        signal,
+        quantity=JointQuantity.FORCE,
+        unit=si if signal.unit == "1" else signal.unit,
+        scale=signal.scale * constant,
+        assumed=(f"the command, times {constant:g}, taken as the force in {si}",),
+    )
+
+
 def no_force(joint: str) -> LogSignal:
     """Return the command of a joint that nothing pushes: 0 throughout.
 
@@ -166,6 +195,9 @@ def _control(log: Log, joint: str, quantity: JointQuantity) -> LogSignal | None:
         log.questions.append(str(question))
         return None
     unit = (source.unit if source else "") or log.columns.units.get(column, "")
+    if quantity is JointQuantity.CURRENT_COMMAND:
+        # The gear of such an actuator is a torque constant, so that its control is a current.
+        unit = ""
     signal = LogSignal(
         joint=joint,
         quantity=quantity,

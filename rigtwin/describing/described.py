@@ -50,6 +50,10 @@ class Described:
         The map of the log, TOML.
     rows
         Table of what was taken for what, its head first.
+    stated
+        Statements of the log's owner that the description follows.
+    test
+        Kind of the test as the owner states it; empty where it was concluded.
     """
 
     machine: Machine
@@ -58,6 +62,8 @@ class Described:
     description: str = field(repr=False)
     mapping: str = field(repr=False)
     rows: tuple[Sequence[str], ...] = field(repr=False)
+    stated: Mapping[str, str] = field(default_factory=dict, repr=False)
+    test: str = ""
 
     @property
     def assumptions(self) -> tuple[str, ...]:
@@ -260,6 +266,8 @@ def describe_log(
         description=description,
         mapping=mapping,
         rows=tuple(table_rows(mechanism, reading)),
+        stated=dict(stated),
+        test=test,
     )
 
 

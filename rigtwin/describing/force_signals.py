@@ -9,9 +9,10 @@ import numpy as np
 
 from rigtwin.describing.checks import Slope, force_slopes, is_magnitude
 from rigtwin.describing.log import STATED, Log
+from rigtwin.describing.matching import REMAINING, UNNAMED, Match
 from rigtwin.describing.quantity import SI, JointQuantity
 from rigtwin.describing.question import Question, ask, enumerate_names, option
-from rigtwin.describing.replay_kind import takes_force
+from rigtwin.describing.replay_kind import MOVING, takes_force
 from rigtwin.describing.signal import LogSignal
 from rigtwin.describing.units import Unit, actuator_constant, force_unit
 from rigtwin.description.joint_elements import actuator_on
@@ -29,6 +30,8 @@ SHOWN = 0.5
 """Share of a force that the model must explain for its scale or sign to be judged."""
 MOTIONS = (JointQuantity.POSITION, JointQuantity.VELOCITY)
 """Quantities that are no force."""
+COMMANDS = (*MOVING, JointQuantity.VELOCITY_COMMAND, JointQuantity.VOLTAGE)
+"""Quantities of which one moves a joint."""
 SUGGESTED = 3
 """Columns of one joint that a question offers."""
 
@@ -134,6 +137,32 @@ def _is_force(log: Log, signal: LogSignal) -> bool:
     return not signal.commands or takes_force(log.mechanism, signal.joint)
 
 
+def offer_remaining_command(log: Log, positions: Mapping[str, Array]) -> None:
+    """Offer the only column without a meaning as the command of the only joint's actuator.
+
+    The model must explain that column as the force that moves the joint, and its size.
+
+    Parameters
+    ----------
+    log
+        The log, to whose slots the column is added.
+    positions
+        Joint → position, SI, shape (rows,).
+    """
+    joints = list(positions)
+    actuator = actuator_on(log.mechanism, joints[0]) if len(joints) == 1 else None
+    if actuator is None or log.mechanism.positions(actuator):
+        return
+    joint, unnamed = joints[0], [name for name, why in log.unused.items() if why == UNNAMED]
+    if len(unnamed) != 1 or any(log.slots.has(joint, quantity) for quantity in COMMANDS):
+        return
+    slope = _slope(log, joint, positions, log.columns.values[unnamed[0]])
+    ratio = slope.slope * actuator_constant(log.mechanism, actuator) if slope else 0.0
+    if slope is not None and slope.explained > SHOWN and SLOPE_LOW < ratio < SLOPE_HIGH:
+        log.slots.offer(Match(unnamed[0], joint, JointQuantity.COMMAND, REMAINING, 0.5))
+        del log.unused[unnamed[0]]
+
+
 def suggest_forces(
     log: Log, joints: Sequence[str], positions: Mapping[str, Array], forces: Mapping[str, LogSignal]
 ) -> None:
@@ -162,7 +191,7 @@ def suggest_forces(
     # With one joint, any column without a meaning could be its force; with several, the offers
     # would be too many to judge.
     if len(joints) == 1 and lacking and not offers:
-        offers = {joints[0]: [name for name, why in log.unused.items() if "fits no joint" in why]}
+        offers = {joints[0]: [name for name, why in log.unused.items() if why == UNNAMED]}
     unclear: list[tuple[str, str]] = []
     for joint, names in offers.items():
         for name in names[:SUGGESTED]:
@@ -223,6 +252,12 @@ def _factor(log: Log, joint: str, ratio: float) -> float:
 def _check_force(log: Log, signal: LogSignal, slope: Slope) -> LogSignal:
     """The signal with its sign checked; a question is added where its scale is in doubt."""
     stated = signal.why == STATED
+    if slope.explained < SHOWN and signal.quantity is JointQuantity.CURRENT_COMMAND:
+        log.questions.append(
+            f"column {signal.column!r} is a current, and the model explains "
+            f"{100.0 * slope.explained:.0f} % of it; is it the control of the model's actuator? "
+            f"say {option(signal.key, signal.column)}, or {option(signal.key, 'COLUMN')}"
+        )
     if slope.explained < SHOWN:
         share = f"{100.0 * slope.explained:.0f} %"
         text = f"sign and scale not confirmed: the model explains {share} of it"

@@ -6,10 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from rigtwin.describing.heading import split_words
-from rigtwin.describing.quantity import COMMANDED, MEASURED, WORDS, JointQuantity
+from rigtwin.describing.quantity import COMMANDED, COORDINATES, MEASURED, WORDS, JointQuantity
 from rigtwin.description.joint_elements import body_of, movable_joints
 from rigtwin.description.mechanism import Mechanism
 
+SHORTEST_WORD = 3
+"""Characters of the shortest word that identifies a joint by itself."""
 QUANTITY_WORDS = frozenset().union(*WORDS.values())
 MEASURES = {
     "position": JointQuantity.POSITION,
@@ -33,12 +35,15 @@ class Alias:
         Quantity of the sensor or actuator with this name. None for the name of a joint.
     name
         Name as written in the model.
+    is_part
+        Whether the alias is one word of a longer name.
     """
 
     joint: str
     words: tuple[str, ...]
     quantity: JointQuantity | None
     name: str
+    is_part: bool = False
 
 
 def list_aliases(mechanism: Mechanism) -> list[Alias]:
@@ -47,7 +52,8 @@ def list_aliases(mechanism: Mechanism) -> list[Alias]:
     These are the names of the joint, of its actuators and sensors, and of the body that it moves
     alone. Each name comes in several forms: complete, without words that do not tell joints apart,
     such as joint, servo, encoder or position, and without those that all joints share, such as the
-    name of the robot.
+    name of the robot. A word that belongs to the name of one joint alone identifies it as well, as
+    the hip of hip_pitch does beside a knee.
 
     Parameters
     ----------
@@ -77,7 +83,28 @@ def list_aliases(mechanism: Mechanism) -> list[Alias]:
         for form in _forms(body, shared):
             if form not in taken:
                 aliases.setdefault((joint, form), Alias(joint, form, None, f"body {body}"))
+    for joint, word in _distinctive_words(joints, list(aliases.values())):
+        alias = Alias(joint, (word,), None, f"{word} of {joint}", is_part=True)
+        aliases.setdefault((joint, (word,)), alias)
     return list(aliases.values())
+
+
+def _distinctive_words(joints: Sequence[str], aliases: Sequence[Alias]) -> list[tuple[str, str]]:
+    """Joints, and the words of their own names that no alias of another joint contains."""
+    vocabulary = {
+        joint: {word for alias in aliases if alias.joint == joint for word in alias.words}
+        for joint in joints
+    }
+    plain = QUANTITY_WORDS | MEASURED | COMMANDED | COORDINATES
+    return [
+        (joint, word)
+        for joint in joints
+        for word in split_words(joint)
+        if len(word) >= SHORTEST_WORD
+        and not word.isdigit()
+        and word not in plain
+        and not any(word in vocabulary[other] for other in joints if other != joint)
+    ]
 
 
 def _forms(name: str, shared: frozenset[str]) -> list[tuple[str, ...]]:

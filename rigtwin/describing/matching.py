@@ -143,12 +143,13 @@ def _by_alias(
             if alias.quantity in (None, JointQuantity.COMMAND):
                 quantity = JointQuantity.POSITION
                 why += ", taken as the position"
-        # More unknown words than known ones: the joint's name stands in it by chance.
-        if len(meaning.unknown) > len(alias.words):
+        # More unknown words than known ones: the joint's name stands in it by chance. A part of the
+        # name is enough only where all other words have a meaning.
+        if len(meaning.unknown) > (0 if alias.is_part else len(alias.words)):
             continue
         # Fewer unknown words decide first, then the longer name: "left elbow" before "elbow".
         quality = (-len(meaning.unknown), len(alias.words), float(exact))
-        rank = 2.0 + exact - 0.1 * len(meaning.unknown)
+        rank = 2.0 + exact - 0.1 * len(meaning.unknown) - 0.5 * alias.is_part
         match = Match(column, alias.joint, quantity, why, rank)
         if quality > best:
             best, matches = quality, {match.joint: match}
@@ -164,6 +165,8 @@ def _commanded(quantity: JointQuantity | None) -> JointQuantity:
         return JointQuantity.COMMAND
     if quantity is JointQuantity.VELOCITY:
         return JointQuantity.VELOCITY_COMMAND
+    if quantity is JointQuantity.CURRENT:
+        return JointQuantity.CURRENT_COMMAND
     return JointQuantity.VOLTAGE if quantity is JointQuantity.VOLTAGE else JointQuantity.OTHER
 
 

@@ -18,6 +18,8 @@ class JointQuantity(Enum):
     """Command that says itself that it is a force or a torque."""
     VELOCITY_COMMAND = "velocity command"
     """Command that says itself that it is a velocity."""
+    CURRENT_COMMAND = "current command"
+    """Command that says itself that it is a current."""
     VOLTAGE = "voltage"
     """Voltage of the joint's motor."""
     OTHER = "other"
@@ -114,6 +116,7 @@ SI = {
     JointQuantity.FORCE_COMMAND: ("N", "Nm"),
     JointQuantity.VELOCITY_COMMAND: ("m/s", "rad/s"),
     JointQuantity.CURRENT: ("A", "A"),
+    JointQuantity.CURRENT_COMMAND: ("A", "A"),
 }
 """Quantity → SI unit where the joint slides, and where it turns."""
 

@@ -9,15 +9,26 @@ import numpy as np
 
 from rigtwin.describing.checks import motion_band
 from rigtwin.describing.clock import Clock, find_clock
-from rigtwin.describing.command_signals import force_command, no_force, position_command
+from rigtwin.describing.command_signals import (
+    commanded_force,
+    force_command,
+    no_force,
+    position_command,
+)
 from rigtwin.describing.corrections import read_corrections
-from rigtwin.describing.force_signals import check_forces, force_signals, suggest_forces
+from rigtwin.describing.force_signals import (
+    check_forces,
+    force_signals,
+    offer_remaining_command,
+    suggest_forces,
+)
 from rigtwin.describing.formulas import read_formula
+from rigtwin.describing.heading import read_words, split_words
 from rigtwin.describing.log import Log
-from rigtwin.describing.matching import Match, match_columns
+from rigtwin.describing.matching import UNNAMED, Match, match_columns
 from rigtwin.describing.position_signals import ask_positions, position_signals
 from rigtwin.describing.quantity import JointQuantity
-from rigtwin.describing.question import Question, enumerate_names, option
+from rigtwin.describing.question import Question, ask, enumerate_names, option
 from rigtwin.describing.replay_kind import ReplayKind, choose_kind, free_swing
 from rigtwin.describing.schedule_signals import ScheduleColumn, schedule_columns
 from rigtwin.describing.signal import LogSignal
@@ -107,9 +118,9 @@ def read_log(
     # Only forces can be held against inverse dynamics.
     if kind.test in (INVERSE, FORCES):
         signals = check_forces(log, signals, values)
+    _note_resting(log, joints)
     if log.questions or log.clock is None:
         raise _all_questions(log, signals)
-    _note_resting(log, joints)
     velocities = [s.joint for s in motions.values() if s.quantity is JointQuantity.VELOCITY]
     if kind.test != INVERSE:
         measured = "velocities" if velocities else "positions"
@@ -162,6 +173,7 @@ def _choose_movers(
 ) -> tuple[ReplayKind, list[LogSignal]]:
     """The kind of the test, and the forces or commands that it needs."""
     joints = list(positions)
+    offer_remaining_command(log, positions)
     forces, still = force_signals(log, positions)
     try:
         placed = all(signal.quantity is JointQuantity.POSITION for signal in signals)
@@ -184,13 +196,29 @@ def _choose_movers(
 
 
 def _note_resting(log: Log, joints: Sequence[str]) -> None:
-    """Note the joints whose position no column holds."""
+    """Note the joints whose position no column holds, or ask where a column may be that."""
     resting = [joint for joint in movable_joints(log.mechanism) if joint not in joints]
-    if resting:
+    undecided = [j for j in resting if log.slots.stated(j, JointQuantity.POSITION) is None]
+    unnamed = [name for name, why in log.unused.items() if why == UNNAMED and _is_position(name)]
+    if undecided and unnamed:
+        key = f"{undecided[0]}.position"
+        question = ask(
+            f"no column is named as the position of {enumerate_names(undecided)}, and "
+            f"{enumerate_names(unnamed)} {'fits' if len(unnamed) == 1 else 'fit'} no joint",
+            option(key, unnamed[0]),
+            option(key, "none") + " if it rests",
+        )
+        log.questions.append(str(question))
+    elif resting:
         log.notes.append(
             f"{enumerate_names(resting)}: no column is the position, so it stays where the model "
             "has it"
         )
+
+
+def _is_position(column: str) -> bool:
+    meaning = read_words(split_words(column), "")
+    return meaning.quantity is JointQuantity.POSITION and not meaning.commanded
 
 
 def _open(
@@ -233,7 +261,7 @@ def _movers(
     for joint, position in positions.items():
         mover: LogSignal | None = None
         if test == INVERSE:
-            mover = forces.get(joint)
+            mover = forces.get(joint) or commanded_force(log, joint)
             if mover is None:
                 log.questions.append(
                     f"no measured force of joint {joint}; say {option(f'{joint}.force', 'COLUMN')}"

@@ -20,6 +20,7 @@ MOVING = (
     JointQuantity.CURRENT,
     JointQuantity.COMMAND,
     JointQuantity.FORCE_COMMAND,
+    JointQuantity.CURRENT_COMMAND,
 )
 """Quantities of what moves a joint."""
 
@@ -158,7 +159,8 @@ def command_quantities(mechanism: Mechanism, joint: str) -> tuple[JointQuantity,
         return JointQuantity.COMMAND, JointQuantity.VOLTAGE
     if mechanism.falls_with_speed(actuator):
         return JointQuantity.VELOCITY_COMMAND, JointQuantity.COMMAND
-    return JointQuantity.FORCE_COMMAND, JointQuantity.COMMAND
+    # The control of a model's motor may be a current, with its torque constant as the gear.
+    return JointQuantity.FORCE_COMMAND, JointQuantity.COMMAND, JointQuantity.CURRENT_COMMAND
 
 
 def takes_force(mechanism: Mechanism, joint: str) -> bool:

@@ -45,6 +45,16 @@ class Slots:
             if match.column not in used:
                 self._matches.setdefault((match.joint, match.quantity), []).append(match)
 
+    def offer(self, match: Match) -> None:
+        """Add a column that was matched by other evidence than its name.
+
+        Parameters
+        ----------
+        match
+            Column, with the joint and the quantity that it is offered for.
+        """
+        self._matches.setdefault((match.joint, match.quantity), []).append(match)
+
     def has(self, joint: str, quantity: JointQuantity) -> bool:
         """Whether the log offers a quantity of a joint."""
         stated = self._stated.slots.get((joint, quantity))

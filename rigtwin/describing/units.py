@@ -29,6 +29,10 @@ PERCENT = "%"
 """Unit of a share, as files state it."""
 LARGEST_PERCENT = 100.0
 """Some loggers write shares of a joint's range in percent."""
+FEWEST_COUNTS = 20
+"""Different positions of a joint from which the count of its encoder can be seen."""
+COUNT_TOLERANCE = 0.03
+"""Deviation of log2 of the number of counts of a turn from a whole number: 2 % of the count."""
 ALIKE = 5.0
 """Largest ratio of the strokes of a command and of the position that follows it."""
 
@@ -213,7 +217,7 @@ def _common_unit(
         )
         # A shaft without a range may turn on and on.
         raise question if _limited(mechanism, outside) else UnitQuestion(question, si, small)
-    if percent:
+    if percent and not _are_counts([columns.values[positions[joint]] for joint in joints]):
         raise ask(
             f"{reach}; is it degrees, or a share of the joint's range in percent?",
             answers[1],
@@ -226,6 +230,23 @@ def _common_unit(
     names, surely = ("rad or degrees", SURELY_DEGREES) if turns else ("m or mm", SURELY_MILLIMETRES)
     question = ask(f"{reach}, and joint {beyond} has no range; are these {names}?", *answers)
     raise UnitQuestion(question, si, small, likely=largest >= surely)
+
+
+def _are_counts(positions: Sequence[Array]) -> bool:
+    """Whether several positions in degrees are multiples of one encoder's count.
+
+    A turn in degrees has a power of two of such counts. Shares of the joints' ranges have another
+    step at each joint.
+    """
+    steps = []
+    for values in positions:
+        differences = np.diff(np.unique(values[np.isfinite(values)]))
+        if len(differences) < FEWEST_COUNTS:
+            continue
+        # Rounding in the file spreads the steps about the count.
+        steps.append(float(np.mean(differences[differences < 1.5 * np.min(differences)])))
+    counts = [math.log2(360.0 / step) for step in steps]
+    return len(counts) > 1 and all(abs(n - round(n)) < COUNT_TOLERANCE for n in counts)
 
 
 def _extremes(values: Array) -> tuple[float, float]:

@@ -1,0 +1,86 @@
+"""Columns that name a joint by a part of its name, by elimination, or in the encoder's counts."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import rigtwin
+from rigtwin.errors import RigtwinError
+from rigtwin.numerics.arrays import Array
+from tests.helpers.logs import write_log
+
+LEG = """<mujoco><compiler angle="radian" autolimits="true"/><option gravity="0 0 0"/><worldbody>
+<body name="thigh"><joint name="hip_pitch" axis="0 1 0" range="-2 2" damping="0.1"/>
+<inertial pos="0 0 0" mass="1" diaginertia="0.02 0.02 0.02"/>
+<body name="calf" pos="0 0 -0.2"><joint name="knee" axis="0 1 0" range="-2 2" damping="0.1"/>
+<inertial pos="0 0 0" mass="1" diaginertia="0.02 0.02 0.02"/></body></body></worldbody>
+<actuator><position name="p1" joint="hip_pitch" kp="20" kv="1"/>
+<position name="p2" joint="knee" kp="20" kv="1"/></actuator></mujoco>"""
+SHAFT = """<mujoco><option gravity="0 0 0"/><worldbody><body name="rotor">
+<joint name="shaft" axis="0 0 1"/><inertial pos="0 0 0" mass="1" diaginertia="0.02 0.02 0.02"/>
+</body></worldbody><actuator><motor name="drive" joint="shaft" gear="0.5"/></actuator></mujoco>"""
+PERIOD, ROWS, INERTIA, TORQUE_CONSTANT = 5e-3, 2000, 0.02, 0.5
+TIME = PERIOD * np.arange(ROWS)
+SWING = 0.4 * np.sin(2.0 * TIME) + 0.1 * np.sin(9.0 * TIME)
+ACCELERATION = -0.4 * 4.0 * np.sin(2.0 * TIME) - 0.1 * 81.0 * np.sin(9.0 * TIME)
+
+
+def sources(folder: Path, model: str, columns: dict[str, Array], **stated: str) -> dict[str, str]:
+    """Names of the signals that a log holds, and their columns."""
+    (folder / "model.xml").write_text(model)
+    log = write_log(folder / "log.csv", {"time": TIME, **columns})
+    named = {key.replace("__", "."): text for key, text in stated.items()}
+    answer = rigtwin.describe(folder / "model.xml", log, columns=named)
+    return {signal.key: signal.source for signal in answer.reading.signals}
+
+
+def test_a_word_of_one_joints_name_identifies_it(tmp_path: Path) -> None:
+    columns = {"q_hip": SWING, "q_knee": SWING, "q_des_hip": SWING, "q_des_knee": SWING}
+    assert sources(tmp_path, LEG, columns) == {
+        "hip_pitch.position": "q_hip",
+        "knee.position": "q_knee",
+        "hip_pitch.command": "q_des_hip",
+        "knee.command": "q_des_knee",
+    }
+
+
+def test_a_word_beside_another_joints_word_identifies_nothing(tmp_path: Path) -> None:
+    columns = {"q_hip_yaw": SWING, "q_knee": SWING, "q_des_knee": SWING}
+    with pytest.raises(RigtwinError, match=r"position of hip_pitch, and q_hip_yaw fits no joint"):
+        sources(tmp_path, LEG, columns)
+    rests = sources(tmp_path, LEG, columns, hip_pitch__position="none")
+    assert rests == {"knee.position": "q_knee", "knee.command": "q_des_knee"}
+
+
+@pytest.mark.parametrize("name", ["current_set", "i_ref_current", "coil"])
+def test_a_current_or_the_only_column_left_is_the_command(tmp_path: Path, name: str) -> None:
+    current = INERTIA * ACCELERATION / TORQUE_CONSTANT
+    known = sources(tmp_path, SHAFT, {"angle": SWING, name: current})
+    assert known == {"shaft.position": "angle", "shaft.command": name}
+
+
+@pytest.mark.parametrize("name", ["current_set", "coil"])
+def test_a_column_that_moves_nothing_is_no_command(tmp_path: Path, name: str) -> None:
+    noise = np.random.default_rng(3).standard_normal(ROWS)
+    with pytest.raises(RigtwinError, match=r"shaft.command|no column is a measured force"):
+        sources(tmp_path, SHAFT, {"angle": SWING, name: noise})
+
+
+@pytest.mark.parametrize(
+    ("steps", "is_asked"),
+    [((360 / 4096, 360 / 4096), False), ((0.0803, 0.0944), True), ((0.0803, 0.0803), True)],
+)
+def test_counts_of_an_encoder_tell_degrees_from_percent(
+    tmp_path: Path, steps: tuple[float, float], is_asked: bool
+) -> None:
+    angles = [step * np.round(np.degrees(SWING) / step) for step in steps]
+    columns = {"hip_pitch.pos": angles[0], "knee.pos": angles[1]}
+    columns |= {"hip_pitch.cmd": angles[0], "knee.cmd": angles[1]}
+    if is_asked:
+        with pytest.raises(RigtwinError, match="or a share of the joint's range in percent"):
+            sources(tmp_path, LEG, columns)
+    else:
+        assert sources(tmp_path, LEG, columns)["knee.position"] == "knee.pos"

@@ -1,0 +1,76 @@
+"""Logs of force commands whose motion no simulation follows: judged by the forces along it."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import rigtwin
+from rigtwin.describing.described import Described
+from rigtwin.describing.force_view import judge_by_forces, with_forces
+from rigtwin.numerics.arrays import Array
+from tests.helpers.logs import write_log
+
+CARRIAGE = """<mujoco><option gravity="0 0 0"/><worldbody><body name="carriage">
+<joint name="axis" type="slide" axis="1 0 0" damping="{damping}"/>
+<inertial pos="0 0 0" mass="4" diaginertia="0.01 0.01 0.01"/></body></worldbody>
+<actuator><motor name="coil" joint="axis" gear="{gear}"/></actuator></mujoco>"""
+MASS, DAMPING, COGGING, PITCH, PHASE = 4.0, 8.0, 11.0, 0.031, 0.5
+PERIOD, ROWS, STEPS = 4e-3, 2500, 20
+
+
+def follow(cogging: float, seed: int) -> dict[str, Array]:
+    """Time, force and position of a carriage that a controller moves over its magnets."""
+    random = np.random.default_rng(seed)
+    phases = random.uniform(0.0, 6.0, 3)
+    time, forces, positions = PERIOD * np.arange(ROWS), np.zeros(ROWS), np.zeros(ROWS)
+    x = v = 0.0
+    for row in range(ROWS):
+        waves = (math.sin(w * time[row] + p) for w, p in zip((1.3, 2.9, 5.1), phases, strict=True))
+        wanted = 0.06 * sum(waves) * min(time[row], 1.0)
+        force = 4000.0 * (wanted - x) - 200.0 * v
+        forces[row], positions[row] = force, x
+        # The force is held until the next row.
+        for _ in range(STEPS):
+            wave = cogging * math.sin(2.0 * math.pi * x / PITCH + PHASE)
+            v += PERIOD / STEPS / MASS * (force - DAMPING * v - wave)
+            x += PERIOD / STEPS * v
+    return {"t": time, "F": forces, "x": positions + 2e-5 * random.standard_normal(ROWS)}
+
+
+def describe(folder: Path, log: dict[str, Array], gear: float = 1.0, test: str = "") -> Described:
+    model = folder / "axis.xml"
+    model.write_text(CARRIAGE.format(damping=DAMPING, gear=gear))
+    log = {"t": log["t"], "axis_cmd": log["F"] / gear, "axis_pos": log["x"]}
+    return rigtwin.describe(model, write_log(folder / "log.csv", log), test=test)
+
+
+def test_cogging_that_no_simulation_follows_is_found_along_the_motion(tmp_path: Path) -> None:
+    described = describe(tmp_path, follow(COGGING, 5))
+    assert described.reading.kind.test == "force commands"
+    answer = rigtwin.diagnose(tmp_path / "log.csv", machine=tmp_path / "axis.xml")
+    assert answer.verdict == "explained"
+    (finding,) = answer.effects
+    assert str(finding.name) == "cogging@axis"
+    assert finding.parameters["cogging"].value == pytest.approx(COGGING, rel=0.05)
+    assert finding.parameters["cogging_pitch"].value == pytest.approx(PITCH, rel=0.01)
+    assert "judged by the forces along the measured motion" in answer.answer.notes[0]
+
+
+@pytest.mark.parametrize("gear", [1.0, 2.5])
+def test_the_command_times_its_gear_is_the_force(tmp_path: Path, gear: float) -> None:
+    log = follow(0.0, 6)
+    described = describe(tmp_path, log, gear)
+    view = judge_by_forces(described)
+    assert view is not None
+    force = with_forces(described, view, described.record())["/sensor.axis_force"]
+    assert force == pytest.approx(log["F"], abs=1e-5 * np.max(np.abs(log["F"])))
+    # Reading the log as such a test gives the same channel.
+    assert force == pytest.approx(view.record()["/sensor.axis_force"], rel=1e-9)
+
+
+def test_what_its_owner_stated_has_no_other_view(tmp_path: Path) -> None:
+    assert judge_by_forces(describe(tmp_path, follow(0.0, 7), test="force commands")) is None
