@@ -1,4 +1,4 @@
-.PHONY: setup demo test test-slow check benchmark gallery docs system browser clean
+.PHONY: setup demo test test-slow check check-types check-style benchmark gallery docs system browser clean
 .DEFAULT_GOAL := help
 
 PYTHON ?= python3
@@ -44,15 +44,20 @@ test: setup system browser
 	$(BIN)/python -m pytest -n auto --dist loadfile
 
 test-slow: setup system
-	$(BIN)/python -m pytest -n auto --dist loadgroup -m slow
+	$(BIN)/python -m pytest -n auto --dist loadfile -m slow
 
 browser:
 	@bash scripts/browser.sh
 
 check: setup
+	@$(MAKE) --no-print-directory --jobs 2 --output-sync check-types check-style
+
+check-types:
+	$(BIN)/pyright
+
+check-style:
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/pyright
 	$(BIN)/lint-imports --no-cache
 	$(BIN)/codespell README.md CONTRIBUTING.md CHANGELOG.md docs/*.md rigtwin controllers experiments referee machines
 	$(BIN)/numpydoc lint rigtwin/api/*.py

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import rigtwin
+from rigtwin.describing.heading import read_words, split_words
+from rigtwin.describing.quantity import JointQuantity
 from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
 from tests.helpers.logs import write_log
@@ -28,7 +31,9 @@ SWING = 0.4 * np.sin(2.0 * TIME) + 0.1 * np.sin(9.0 * TIME)
 ACCELERATION = -0.4 * 4.0 * np.sin(2.0 * TIME) - 0.1 * 81.0 * np.sin(9.0 * TIME)
 
 
-def sources(folder: Path, model: str, columns: dict[str, Array], **stated: str) -> dict[str, str]:
+def sources(
+    folder: Path, model: str, columns: Mapping[str, Array], **stated: str
+) -> dict[str, str]:
     """Names of the signals that a log holds, and their columns."""
     (folder / "model.xml").write_text(model)
     log = write_log(folder / "log.csv", {"time": TIME, **columns})
@@ -84,3 +89,17 @@ def test_counts_of_an_encoder_tell_degrees_from_percent(
             sources(tmp_path, LEG, columns)
     else:
         assert sources(tmp_path, LEG, columns)["knee.position"] == "knee.pos"
+
+
+@pytest.mark.parametrize(
+    ("column", "quantity"),
+    [
+        ("current_position", JointQuantity.POSITION),
+        ("currentVelocity", JointQuantity.VELOCITY),
+        ("current_force", JointQuantity.FORCE),
+        ("motor_current", JointQuantity.CURRENT),
+        ("current_q", JointQuantity.CURRENT),
+    ],
+)
+def test_the_current_position_is_no_current(column: str, quantity: JointQuantity) -> None:
+    assert read_words(split_words(column), "").quantity is quantity

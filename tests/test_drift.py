@@ -12,6 +12,7 @@ from rigtwin.components import ForceSensor, PositionSensor, VelocitySensor
 from rigtwin.components.sensors import apply_sensor
 from rigtwin.models.measured_motion import recover_motion
 from rigtwin.recording import RecordedTest
+from tests.helpers.twin import recorded
 
 PERIOD = 2e-3
 TIME = np.arange(10_000) * PERIOD
@@ -60,8 +61,7 @@ def test_without_drift_none_is_named():
 )
 @pytest.mark.slow
 def test_a_drift_on_the_suspension_rig_is_no_offset(sensor: str, drift: float):
-    made = rigtwin.run("suspension-rig", "road10", seed=5, effects={f"drift@{sensor}": drift})
-    answer = rigtwin.diagnose(made)
+    answer = rigtwin.diagnose(recorded("imposed", (f"drift@{sensor}={drift}",), 8.0))
     assert [str(each.name) for each in answer.effects] == [f"drift@{sensor}"]
     (value,) = answer.effects[0].parameters.values()
     assert value.value == pytest.approx(drift, rel=0.05)

@@ -17,7 +17,7 @@ USES = {
         "environments need dm-env: pip install 'rigtwin[learning]'",
     ),
     "viser": (
-        "rigtwin.show_look(rigtwin.look('examples/nominal-imposed.mcap'))",
+        "rigtwin.show_look(rigtwin.look(rigtwin.run('planar-arm', 'swing', seed=1)))",
         "the page needs viser; pip install 'rigtwin[look]'",
     ),
 }

@@ -340,17 +340,6 @@ def test_a_fit_leaves_the_minima_of_stick_and_slip(tmp_path: Path) -> None:
     assert fitted["coulomb@rail"].value == pytest.approx(1.5, rel=1e-3)
 
 
-@pytest.mark.slow
-def test_hidden_friction_is_found_at_its_joint(tmp_path: Path) -> None:
-    machine, path = rigtwin.machine("cart-pole"), tmp_path / "run.mcap"
-    shorter, hidden = {"timing": {"duration": 6.0}}, ["viscous@pivot=0.02"]
-    record = rigtwin.run(machine, "pushes", settings=shorter, effects=hidden, path=path)
-    answer = rigtwin.diagnose(record, machine=machine)
-    (effect,) = answer.effects
-    assert str(effect.name) == "viscous@pivot"
-    assert effect.parameters["viscous"].value == pytest.approx(0.02, rel=0.02)
-
-
 @pytest.mark.parametrize(
     ("values", "instead"),
     [

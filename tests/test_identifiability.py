@@ -50,12 +50,16 @@ def cart(folder: Path) -> rigtwin.Machine:
 
 @pytest.mark.slow
 def test_two_zeros_and_a_gain_that_scales_all_there_is():
-    can = rigtwin.identifiability(rigtwin.machine("damper-bench"))
+    machine = rigtwin.machine("damper-bench")
+    can = rigtwin.identifiability(machine)
     assert can.confounded["offset@damper"] == ("offset@load_cell",)
     assert can.confounded["offset@load_cell"] == ("offset@damper",)
     # Force over velocity is all that a damper bench measures.
     assert set(can.confounded["gain@load_cell"]) == {"viscous@damper", "coulomb@damper"}
     assert {"viscous@damper", "coulomb@damper", "lag@load_cell"} <= set(can.seen)
+    # Every effect that is looked for is judged once.
+    judged = [*can.seen, *can.unseen, *can.confounded]
+    assert sorted(judged) == sorted(effect.name for effect in machine.effects() if effect.searched)
 
 
 def test_the_table_comes_before_what_takes_long(capsys, monkeypatch):
@@ -98,14 +102,6 @@ def test_joints_that_act_on_each_other_are_moved_too():
     can = rigtwin.identifiability(rigtwin.machine("double-pendulum"))
     assert {"coulomb@shoulder", "coulomb@elbow", "gain@torque_1"} <= set(can.seen)
     assert not can.unseen
-
-
-@pytest.mark.slow
-def test_every_effect_that_is_looked_for_is_judged_once():
-    machine = rigtwin.machine("damper-bench")
-    can = rigtwin.identifiability(machine)
-    judged = [*can.seen, *can.unseen, *can.confounded]
-    assert sorted(judged) == sorted(e.name for e in machine.effects() if e.searched)
 
 
 @pytest.mark.slow

@@ -17,13 +17,15 @@ from rigtwin.description.machine import Machine
 from rigtwin.diagnosis.diagnose import diagnose
 from rigtwin.diagnosis.result import Diagnosis
 from rigtwin.recording import RecordedTest, load
-from tests.helpers.recordings import BESIDE
+from tests.helpers.recordings import BESIDE, beginning
 from tests.helpers.twin import recorded
 
 CONFIDENCE, SHARE = 0.02, 0.1
 """Difference of a confidence, and of a value in units of its interval, that does not matter."""
 CROPPED = 10
 """Ticks that are taken off either end."""
+SECONDS = 10.0
+"""Length of the shared recordings that are diagnosed, s."""
 JOINTS = BESIDE.parent / "joints"
 
 Recordings = Sequence[RecordedTest]
@@ -116,7 +118,7 @@ def bring_shared(file: str, machine: str) -> Callable[[], tuple[Machine, Recordi
         if not (folder / file).exists():
             pytest.skip(f"{file} is not beside the checkout")
         name = machine if machine == "suspension-rig" else str(JOINTS / machine)
-        return find(name), [load(folder / file)]
+        return find(name), [beginning(load(folder / file), SECONDS)]
 
     return bring
 
@@ -132,8 +134,7 @@ CASES: dict[str, Callable[[], tuple[Machine, Recordings]]] = {
 
 @pytest.fixture(
     scope="module",
-    # One worker takes all changes of a case, and so diagnoses the unchanged data once.
-    params=[pytest.param(name, marks=pytest.mark.xdist_group(name)) for name in CASES],
+    params=CASES,
     ids=lambda name: name.replace(" ", "-"),
 )
 def case(request: pytest.FixtureRequest) -> tuple[Machine, Recordings, Diagnosis]:

@@ -86,13 +86,21 @@ def read_words(words: tuple[str, ...], unit: str) -> Meaning:
     elif "ddot" in words:
         quantity = JointQuantity.OTHER
     else:
-        quantity = next((q for q in PRECEDENCE if WORDS[q] & set(words)), None)
+        quantity = next((q for q in PRECEDENCE if WORDS[q] & _without_adjective(words)), None)
     if quantity is None:
         quantity = _quantity_by_unit(words, unit)
     known = COMMANDED | MEASURED | frozenset(UNIT_WORDS) | {"dot", "ddot"}
     known |= frozenset().union(*WORDS.values())
     unknown = tuple(word for word in words if word not in known and not word.isdigit())
     return Meaning(quantity, commanded, unknown)
+
+
+def _without_adjective(words: tuple[str, ...]) -> set[str]:
+    """Words without the adjective of a current position, velocity or force, which is no current."""
+    # The letter q is no position here: a motor has a current in its q axis.
+    quantities = (JointQuantity.POSITION, JointQuantity.VELOCITY, JointQuantity.FORCE)
+    others = frozenset().union(*(WORDS[quantity] for quantity in quantities)) - {"q"}
+    return set(words) - {"current"} if others & set(words) else set(words)
 
 
 def stated_unit(words: tuple[str, ...]) -> str:
