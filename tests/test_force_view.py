@@ -48,6 +48,7 @@ def describe(folder: Path, log: dict[str, Array], gear: float = 1.0, test: str =
     return rigtwin.describe(model, write_log(folder / "log.csv", log), test=test)
 
 
+@pytest.mark.slow
 def test_cogging_that_no_simulation_follows_is_found_along_the_motion(tmp_path: Path) -> None:
     described = describe(tmp_path, follow(COGGING, 5))
     assert described.reading.kind.test == "force commands"
