@@ -14,6 +14,7 @@ from rigtwin.diagnosis.fitter import Fitter
 from rigtwin.diagnosis.linearised import Linearised
 from rigtwin.diagnosis.space import BOUND, Space
 from rigtwin.diagnosis.spikes import despike
+from rigtwin.diagnosis.tolerance_refit import refit_with_tolerances
 from tests.helpers.twin import RIG, evidence_of, recorded, rig_effect
 
 DIRECT = {"hum", "noise", "quantisation", "missed_ticks"}
@@ -83,7 +84,7 @@ def test_an_effect_is_found_at_its_size(text):
     effect = rig_effect(name)
     evidence = evidence_of(recorded("imposed", (text,)))
     fitter = Fitter(evidence)
-    fit = fitter.refit_with_tolerances(fitter.fit_one(fitter.screen(effect)))
+    fit = refit_with_tolerances(fitter, fitter.fit_one(fitter.screen(effect)))
     nominal = effect.nominal(RigPlant())[effect.kind.parameters[0]]
     wanted = float(value) - (0.0 if nominal > 1e8 else nominal)
     assert fit.values[0][0] - (float(value) - wanted) == pytest.approx(wanted, rel=MADE[text])

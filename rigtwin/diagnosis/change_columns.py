@@ -9,9 +9,10 @@ import numpy as np
 from rigtwin.components import Effect, measures
 from rigtwin.components.plant import Plant
 from rigtwin.description.machine import Machine
+from rigtwin.diagnosis.effect_starts import LIMITS
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.fit import is_possible
-from rigtwin.diagnosis.fitter import LIMITS, Fitter
+from rigtwin.diagnosis.fitter import Fitter
 from rigtwin.diagnosis.recording_equations import FreeParameter
 
 STEP_FACTOR = 3.0

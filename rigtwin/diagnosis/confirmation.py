@@ -11,11 +11,12 @@ from dataclasses import dataclass
 
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.fit import Fit, is_possible, leave_one_out
-from rigtwin.diagnosis.fitter import PERTURBATIONS, Fitter
+from rigtwin.diagnosis.fitter import Fitter
 from rigtwin.diagnosis.posterior import HypothesisPosterior
 from rigtwin.diagnosis.scoring import Scorer
 from rigtwin.diagnosis.threads import Threads
 from rigtwin.diagnosis.thresholds import Thresholds
+from rigtwin.diagnosis.tolerance_refit import PERTURBATIONS, refit_with_tolerances
 
 NEAR_NOISE = 2.0
 """Ratio of the misfit to that of noise up to which an approximation may have feigned an effect.
@@ -72,7 +73,7 @@ def confirm(
     """
     fitter = Fitter(evidence)
     scorer = Scorer(fitter)
-    current = fitter.refit_with_tolerances(fit, PERTURBATIONS)
+    current = refit_with_tolerances(fitter, fit, PERTURBATIONS)
     fits = [current]
     most = HOPELESS * max(fit.misfit, current.misfit)
     while len(current.effects) > 1 and current.misfit <= NEAR_NOISE * evidence.expected:
@@ -83,8 +84,8 @@ def confirm(
         ]
         rough = threads.map(lambda start: coarse.refine(*start), starts)
         reduced = threads.map(
-            lambda fewer: fitter.refit_with_tolerances(
-                fitter.refine(fewer.effects, fewer.values), ()
+            lambda fewer: refit_with_tolerances(
+                fitter, fitter.refine(fewer.effects, fewer.values), ()
             ),
             [fewer for fewer in rough if fewer.misfit < most],
         )

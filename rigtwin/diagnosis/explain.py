@@ -12,11 +12,12 @@ from rigtwin.diagnosis.confirmation import confirm
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.first_look import FirstLook
 from rigtwin.diagnosis.fit import Fit, clashes, is_possible, leave_one_out
-from rigtwin.diagnosis.fitter import PERTURBATIONS, Fitter
+from rigtwin.diagnosis.fitter import Fitter
 from rigtwin.diagnosis.posterior import HypothesisPosterior
 from rigtwin.diagnosis.search import HypothesisSearch
 from rigtwin.diagnosis.threads import Threads
 from rigtwin.diagnosis.thresholds import STANDARD, Thresholds
+from rigtwin.diagnosis.tolerance_refit import PERTURBATIONS, refit_with_tolerances
 
 OBSERVABLE = 60.0
 """Chi-square that an effect must change at some size to count as observable."""
@@ -110,7 +111,7 @@ def explain(
         ):
             # Restarts nearby are a search as well, for which no effort may be left.
             restarts = () if search.ended_early else PERTURBATIONS
-            fit = Fitter(evidence).refit_with_tolerances(fit, restarts)
+            fit = refit_with_tolerances(Fitter(evidence), fit, restarts)
         return Explanation(
             posterior=posterior,
             fit=fit,

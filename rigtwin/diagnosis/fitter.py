@@ -9,47 +9,31 @@ the residual r and the tolerances eliminated (`Space.strengths`), that is (d'r)^
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
-from itertools import product
 
 import numpy as np
 
-from rigtwin.components import Effect, Guide, Scales, Starts
+from rigtwin.components import Effect, Guide, Starts
 from rigtwin.components.guide import resists
 from rigtwin.components.plant import Plant, component_of
-from rigtwin.components.scales import Swing
+from rigtwin.diagnosis.effect_starts import EffectStarts
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.fit import Fit, Values, is_possible, with_values
-from rigtwin.diagnosis.gauss_newton import is_sufficient, minimise
+from rigtwin.diagnosis.gauss_newton import minimise
 from rigtwin.diagnosis.space import Space
-from rigtwin.diagnosis.spikes import JUMPS
-from rigtwin.diagnosis.swing import swings
 from rigtwin.numerics.arrays import Array
 
-PERTURBATIONS = (0.88, 0.95, 1.05, 1.12)
-"""Factors of a fitted value from which the fit is repeated."""
-TOLERANCE_PASSES = 2
-"""Number of times that the tolerances are estimated at a fit."""
-TOLERANCE_CHANGE = 0.05
-"""Change of every tolerance, in half widths, below which they are not estimated again."""
 BOUND_SHARE = 1e-3
 """Distance from a bound, as a share of it, within which a value stands at the bound."""
 REFINED_STARTS = 3
 """Largest number of starts of a single effect that are refined."""
 START_SHORTFALL = 0.5
 """A start is refined if it gains at most this share less than the best start."""
-LIMITS = ("saturation", "rate_limit", "resonance", "force_limit", "end_stops")
-"""Kinds whose response does not scale with their magnitude."""
 CACHED_RESPONSES = 256
 """Number of cached responses beside a fit."""
 SMALL_START = 0.05
 """Share of the smallest start at which an effect is simulated as well."""
-SUFFICIENT_RATIO = 0.95
-"""Ratio of the misfit to that of noise and declared error below which no perturbed start is
-tried."""
-SMALL_START_BESIDE = 0.2
-"""Share of the smallest start at which an effect is simulated as well beside other effects."""
 NO_RESPONSE = 1e-3
 """Chi-square below which an effect has no response."""
 Responses = list[tuple[tuple[float, ...], Array]]
@@ -84,15 +68,11 @@ class Fitter:
         Recordings that are explained.
     plant
         Nominal plant.
-    swing
-        Swing of each command over all recordings, by the component that it moves.
     """
 
     def __init__(self, evidence: Evidence) -> None:
         self.evidence, self.plant = evidence, evidence.plant
-        self.swing = swings(evidence.machine, evidence.recordings)
-        self._scales: dict[str, Scales] = {}
-        self._starts: dict[Effect, Starts] = {}
+        self._starts = EffectStarts(evidence)
         self._nominal_residual = evidence.residual(evidence.plant)
         self._responses: dict[Effect, Responses] = {}
         self._beside: dict[tuple[object, ...], Responses] = {}
@@ -111,69 +91,11 @@ class Fitter:
 
     def starts(self, effect: Effect) -> Starts:
         """Return the values from which a search for an effect starts."""
-        if effect not in self._starts:
-            self._starts[effect] = self._starts_at(effect, self.plant)
-        return self._starts[effect]
+        return self._starts.nominal(effect)
 
-    def _starts_at(self, effect: Effect, plant: Plant) -> Starts:
-        swing = self.swing.get(effect.component, Swing())
-        return effect.starts(plant, swing, lambda: self._scale(effect.group))
-
-    def _scale(self, component: str) -> Scales:
-        """Return the scales of a component's motion and force on the longest recording.
-
-        The motion is simulated with the nominal plant; the force is the largest measured one.
-        """
-        if component not in self._scales:
-            longest = max(
-                range(len(self.evidence.models)), key=lambda n: self.evidence.recordings[n].ticks
-            )
-            measured = self.evidence.lines[longest].measured
-            forces = [
-                measured[n] for n, row in enumerate(self.evidence.machine.rows) if row.kind in JUMPS
-            ]
-            # A machine without a measured force or command has none to scale by.
-            force = max((float(np.sqrt(np.mean(column**2))) for column in forces), default=0.0)
-            motion = self.evidence.models[longest].motion(component, self.plant)
-            period = self.evidence.lines[longest].period
-            position = self._measured_position(component)
-            self._scales[component] = Scales.of(motion, force, period, position)
-        return self._scales[component]
-
-    def _measured_position(self, component: str) -> Array | None:
-        """Return the measured positions of a component's joint in all recordings, if any."""
-        described = self.evidence.machine.components
-        if component not in described:
-            return None
-        joint = described[component].joint
-        for number, row in enumerate(self.evidence.machine.rows):
-            at_joint = row.name in described and described[row.name].joint == joint
-            if row.kind == "position" and joint is not None and at_joint:
-                return np.concatenate([lines.measured[number] for lines in self.evidence.lines])
-        return None
-
-    def _few_starts(self, effect: Effect, plant: Plant) -> list[tuple[float, ...]]:
-        """Return a small and a middle magnitude of each shape and sign.
-
-        A response scales with its magnitude only over a limited range: dry friction that exceeds
-        the driving force, for example, stops the motion.
-        """
-        starts = self._starts_at(effect, plant)
-        nominal = effect.nominal(plant)[effect.kind.parameters[0]]
-        shapes: dict[tuple[float, ...], list[tuple[float, ...]]] = {}
-        for values in starts.values:
-            sign = 1.0 if values[0] >= nominal else -1.0
-            shapes.setdefault((sign, *values[1:]), []).append(values)
-        few = []
-        for values in shapes.values():
-            # Sorted by distance from nominal, the first is the smallest change and that in the
-            # middle a typical one.
-            values.sort(key=lambda start: abs(start[0] - nominal))
-            few.append(values[len(values) // 2])
-            if effect.kind.name not in LIMITS and not starts.is_linear:
-                small = nominal + SMALL_START_BESIDE * (values[0][0] - nominal)
-                few.append((small, *values[0][1:]))
-        return few
+    def scale_start(self, effect: Effect, start: tuple[float, ...], share: float) -> Values:
+        """Scale the magnitude of a start about its nominal value, see `EffectStarts.scale`."""
+        return self._starts.scale(effect, start, share)
 
     def screen(self, effect: Effect) -> Screened:
         """Simulate one effect at every value from which a search for it starts.
@@ -352,7 +274,7 @@ class Fitter:
         if responses is None:
             responses = []
             without = self.residual_at(first)
-            for start in self._few_starts(effect, first.plant):
+            for start in self._starts.few(effect, first.plant):
                 with_effect = self.evidence.residual(with_values(first.plant, (effect,), (start,)))
                 responses.append((start, (without - with_effect).astype(np.float32)))
             # A new dictionary replaces the old one in a single assignment: threads that read the
@@ -369,106 +291,6 @@ class Fitter:
             # Key and residual are stored as one tuple, so that no thread sees an unmatched pair.
             self._residual = key, residual
         return residual
-
-    def scale_start(self, effect: Effect, start: tuple[float, ...], share: float) -> Values:
-        """Scale the magnitude of a start about its nominal value.
-
-        Parameters
-        ----------
-        effect
-            Effect of the start.
-        start
-            Values of the effect.
-        share
-            Factor of the magnitude's difference from nominal. Limits are not scaled.
-
-        Returns
-        -------
-        tuple
-            Values of this single effect.
-        """
-        nominal = tuple(effect.nominal(self.plant).values())
-        if effect.kind.name in LIMITS:
-            return (start,)
-        count = effect.kind.magnitudes
-        scaled = (
-            value + share * (begun - value)
-            for begun, value in zip(start[:count], nominal, strict=False)
-        )
-        return ((*scaled, *start[count:]),)
-
-    def refit_with_tolerances(self, fit: Fit, restarts: Sequence[float] = PERTURBATIONS) -> Fit:
-        """Refit effects with the responses to the tolerances taken at the fit.
-
-        Estimate and refit alternate. Mechanical tolerances act nonlinearly beside dry friction, so
-        they are moved in the plant itself; the others stay linear.
-
-        Parameters
-        ----------
-        fit
-            Fit about the nominal plant.
-        restarts
-            Factors of a fitted value from which the fit is repeated.
-
-        Returns
-        -------
-        Fit
-            Fit of the same effects, with `base` and `used`.
-        """
-        tolerances = self.evidence.machine.tolerances
-        mechanical = np.array([tolerance.mechanical for tolerance in tolerances], bool)
-        # The responses at the nominal plant are precise enough for the first estimate.
-        space = self.space.without_replaced(fit.effects)
-        used = np.zeros(len(tolerances))
-        residual = self.evidence.residual(fit.plant)
-        for number in range(TOLERANCE_PASSES):
-            estimate = np.where(mechanical, space.estimate_tolerances(residual), 0.0)
-            if number and np.max(np.abs(estimate - used), initial=0.0) < TOLERANCE_CHANGE:
-                break
-            used = estimate
-            base = self.evidence.shift(self.plant, used.tolist())
-            # `used` tells the space how far the plant has moved already, so that the prior still
-            # pulls towards nominal and not towards the last estimate.
-            space = Space(
-                self.evidence, with_values(base, fit.effects, fit.values), used, fit.effects
-            )
-            refined = self.refine(fit.effects, fit.values, space, base)
-            fit = self._perturb(refined, space, base, restarts)
-            residual = self.evidence.residual(with_values(base, fit.effects, fit.values))
-            fit = replace(fit, base=base, used=tuple(used.tolist()))
-        return fit
-
-    def _perturb(self, fit: Fit, space: Space, base: Plant, restarts: Sequence[float]) -> Fit:
-        """Restart nearby: stick-slip makes the misfit discontinuous.
-
-        Each value is changed in turn by a few per cent, and refined again where that alone already
-        lowers the misfit.
-        """
-        if is_sufficient(fit.misfit, self.evidence.expected, SUFFICIENT_RATIO):
-            return fit
-        for number, effect in enumerate(fit.effects):
-            fitted = len(effect.kind.parameters) - len(effect.kind.constants)
-            for place, share in product(range(fitted), restarts):
-                perturbed = list(fit.values[number])
-                # Magnitudes are scaled about their nominal value, shapes and limits about 0.
-                # A limit's nominal value is practically infinite (`UNLIMITED`), so its distance
-                # from there has no meaning.
-                from_zero = place > 0 or effect.kind.name in LIMITS
-                nominal = (
-                    0.0 if from_zero else effect.nominal(self.plant)[effect.kind.parameters[0]]
-                )
-                perturbed[place] = nominal + share * (perturbed[place] - nominal)
-                values = (*fit.values[:number], tuple(perturbed), *fit.values[number + 1 :])
-                if (
-                    space.misfit(self.evidence.residual(with_values(base, fit.effects, values)))
-                    < fit.misfit
-                ):
-                    fit = min(
-                        fit,
-                        self.refine(fit.effects, values, space, base),
-                        key=lambda candidate: candidate.misfit,
-                    )
-        return fit
 
     def bounds(self, effects: Sequence[Effect]) -> tuple[Array, Array]:
         """Return the range in which the values of effects are searched.

@@ -14,7 +14,7 @@ from rigtwin.diagnosis.balance import balance_forces
 from rigtwin.diagnosis.effect_fit import EffectFit
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.fit import Fit, clashes, is_possible, with_values
-from rigtwin.diagnosis.fitter import PERTURBATIONS, Fitter
+from rigtwin.diagnosis.fitter import Fitter
 from rigtwin.diagnosis.gauss_newton import SUFFICIENT_MISFIT
 from rigtwin.diagnosis.known_effects_covariance import (
     TIED,
@@ -24,6 +24,7 @@ from rigtwin.diagnosis.known_effects_covariance import (
     relative_errors_of,
 )
 from rigtwin.diagnosis.minima import leave_minimum
+from rigtwin.diagnosis.tolerance_refit import PERTURBATIONS, refit_with_tolerances
 from rigtwin.errors import RigtwinError
 
 SHARES = (1.0, 0.3)
@@ -126,7 +127,7 @@ def _fit_jointly(
     optima.sort(key=lambda fit: fit.misfit)
     optima[0] = leave_minimum(coarse, optima[0])
     # A settled optimum needs no further starts nearby.
-    fit = exact.refit_with_tolerances(optima[0], () if settled else PERTURBATIONS)
+    fit = refit_with_tolerances(exact, optima[0], () if settled else PERTURBATIONS)
     progress(1)
     return fit, optima
 

@@ -23,6 +23,7 @@ import math
 from collections.abc import Callable, Collection, Sequence
 from copy import copy
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
@@ -53,6 +54,7 @@ from rigtwin.diagnosis.starts import (
 )
 from rigtwin.diagnosis.threads import Threads
 from rigtwin.diagnosis.thresholds import Thresholds
+from rigtwin.diagnosis.tolerance_refit import refit_with_tolerances
 
 SETTLED = 6
 """Number of single effects that are refitted precisely."""
@@ -200,7 +202,7 @@ class HypothesisSearch:
         """Fit the nominal plant and each promising effect alone, the best fit first."""
         self.screened = self.threads.map(self.coarse.screen, self.effects)
         # The empty hypothesis comes first: the posterior and its prices refer to it.
-        self._add([self.fine.refit_with_tolerances(self.fine.nominal_fit)])
+        self._add([refit_with_tolerances(self.fine, self.fine.nominal_fit)])
         # Prices are in nats; a chi-square is twice as large.
         price = 2.0 * self.posterior.prices.ordinary
         self.on_first_look(look_first(self.coarse, self.screened, price, self.thresholds))
@@ -329,7 +331,7 @@ class HypothesisSearch:
 
     def _settle(self, fits: Sequence[Fit]) -> None:
         """Refit with the tolerances estimated at the fit, on fine evidence, and score."""
-        self._add(self.threads.map(self.fine.refit_with_tolerances, fits))
+        self._add(self.threads.map(partial(refit_with_tolerances, self.fine), fits))
 
     # Sets of effects
 
