@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
-from rigtwin.api.describing import describe, needs_description, record_logs
+from rigtwin.api.diagnosis_data import DiagnosisData, Recorded, as_list, has_duplicate, read_data
 from rigtwin.api.machines import described_machine, machine_of
-from rigtwin.api.recordings import resolve_recording
+from rigtwin.api.recordings import Recording, resolve_recording
 from rigtwin.api.twin import Settings, names_of, require_unrecorded, twin_of
 from rigtwin.describing.force_view import judge_by_forces, with_forces
 from rigtwin.description.machine import Machine
@@ -20,12 +20,9 @@ from rigtwin.diagnosis.first_look import FirstLook as FirstLook
 from rigtwin.diagnosis.result import Diagnosis
 from rigtwin.diagnosis.thresholds import STANDARD
 from rigtwin.errors import RigtwinError
-from rigtwin.recording import reader
 from rigtwin.simulation.experiment import find_experiment
 from rigtwin.studies.friction_spikes import Calibration
 
-Recorded = reader.RecordedTest | str | Path
-"""A recording, or the path of one."""
 MOST = 0.5
 """Share of the gap below which an answer about a driven motion is poor, and which one about the
 forces along it must close to take its place."""
@@ -151,9 +148,9 @@ def _closed_share(diagnosis: Diagnosis) -> float:
 
 def _by_forces(data: DiagnosisData) -> DiagnosisData | None:
     """Return logs of force commands with the motion prescribed; None for any other recordings."""
-    origin = getattr(data.recordings[0], "origin", None)
-    view = judge_by_forces(origin) if origin is not None else None
-    if view is None:
+    first = data.recordings[0]
+    origin = first.origin if isinstance(first, Recording) else None
+    if origin is None or (view := judge_by_forces(origin)) is None:
         return None
     fitted, judged = (
         tuple(with_forces(origin, view, recording) for recording in recordings)
@@ -170,64 +167,6 @@ def _with_note(diagnosis: Diagnosis, before: Diagnosis) -> Diagnosis:
     )
     answer = replace(diagnosis.answer, notes=(note, *diagnosis.answer.notes))
     return replace(diagnosis, answer=answer)
-
-
-@dataclass(frozen=True)
-class DiagnosisData:
-    """Recordings of one machine.
-
-    Attributes
-    ----------
-    machine : Machine
-        Machine of all recordings.
-    recordings : tuple of Recording
-        Recordings to fit, at least one.
-    held_out : tuple of Recording
-        Recordings to judge on.
-    """
-
-    machine: Machine
-    recordings: tuple[reader.RecordedTest, ...]
-    held_out: tuple[reader.RecordedTest, ...]
-
-
-def read_data(
-    recordings: Recorded | Sequence[Recorded],
-    machine: Machine | str | Path | None,
-    held_out: Recorded | Sequence[Recorded],
-    columns: Mapping[str, str] | None,
-    test: str,
-) -> DiagnosisData:
-    """Read the recordings that `diagnose` and `fit` take.
-
-    If the machine is a model, the recordings are logs: the first one describes the machine, and
-    all are converted to recordings of it.
-
-    Raises
-    ------
-    RigtwinError
-        If there is no recording, one is named twice, or its machine is unknown.
-    """
-    logs = _as_list(recordings)
-    if needs_description(machine, logs):
-        if not logs:
-            raise RigtwinError("no recording to diagnose")
-        # The first log decides on columns and units; the others must follow it to be comparable.
-        described = describe(machine, logs[0], columns=columns, test=test)  # type: ignore[arg-type]
-        recordings = record_logs(described, logs)
-        held_out = record_logs(described, _as_list(held_out))
-        machine = described.machine
-    elif columns or test:
-        raise RigtwinError("columns and test describe a log; expected a model as the machine")
-    fitted = [resolve_recording(recording) for recording in _as_list(recordings)]
-    judged = [resolve_recording(recording) for recording in _as_list(held_out)]
-    if not fitted:
-        raise RigtwinError("no recording to diagnose")
-    if _has_duplicate([*fitted, *judged]):
-        raise RigtwinError(
-            "a recording is named twice; each counts once, and held-out data must not be fitted"
-        )
-    return DiagnosisData(described_machine(fitted[0], machine), tuple(fitted), tuple(judged))
 
 
 def what_changed(
@@ -277,8 +216,8 @@ def what_changed(
     >>> [parameter.name for parameter in changes.changed]  # doctest: +SKIP
     """
     # The order is kept: it is the order of time, in which a change is looked for.
-    loaded = [resolve_recording(recording) for recording in _as_list(recordings)]
-    if _has_duplicate(loaded):
+    loaded = [resolve_recording(recording) for recording in as_list(recordings)]
+    if has_duplicate(loaded):
         raise RigtwinError("a recording is named twice; expected different recordings")
     if not loaded:
         raise RigtwinError("what_changed needs at least two recordings; it has none")
@@ -324,17 +263,3 @@ def calibrate(recording: Recorded) -> Calibration:
             "reverses often, such as friction-road, without compensation"
         )
     return calibration
-
-
-def _as_list(recordings: Recorded | Sequence[Recorded]) -> list[Recorded]:
-    """Return one recording (or log) or several as a list."""
-    if isinstance(recordings, Sequence) and not isinstance(recordings, str):
-        return list(recordings)
-    return [recordings]
-
-
-def _has_duplicate(recordings: Sequence[reader.RecordedTest]) -> bool:
-    """Return whether two recordings are the same file. Those in memory have none."""
-    # Resolved, since links and relative paths may name one file twice.
-    paths = [recording.path.resolve() for recording in recordings if recording.path.exists()]
-    return len(set(paths)) < len(paths)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from rigtwin.api.answers import Recorded
+from rigtwin.api.diagnosis_data import Recorded
 from rigtwin.api.machines import described_machine, machine_of
 from rigtwin.api.recordings import resolve_recording
 from rigtwin.api.twin import Effects, Settings, effect_texts, require_unrecorded, twin_of

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from rigtwin.api.answers import DiagnosisData, Recorded, read_data
+from rigtwin.api.diagnosis_data import DiagnosisData, Recorded, read_data
 from rigtwin.api.twin import Settings, twin_of
 from rigtwin.components import Effect
 from rigtwin.description.configuration import Configuration

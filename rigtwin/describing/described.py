@@ -11,7 +11,7 @@ import numpy as np
 
 from rigtwin.describing.clock import find_clock
 from rigtwin.describing.episodes import episode_column, longest_test
-from rigtwin.describing.matching import ASSUMED
+from rigtwin.describing.match import ASSUMED
 from rigtwin.describing.reading import Reading, read_log
 from rigtwin.describing.writer import table_rows, write_description, write_map
 from rigtwin.description.bare import model_name, name_machine

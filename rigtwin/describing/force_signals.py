@@ -9,7 +9,7 @@ import numpy as np
 
 from rigtwin.describing.checks import Slope, force_slopes, is_magnitude
 from rigtwin.describing.log import STATED, Log
-from rigtwin.describing.matching import REMAINING, UNNAMED, Match
+from rigtwin.describing.match import REMAINING, UNNAMED, Match
 from rigtwin.describing.quantity import SI, JointQuantity
 from rigtwin.describing.question import Question, ask, enumerate_names, option
 from rigtwin.describing.replay_kind import MOVING, takes_force

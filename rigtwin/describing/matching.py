@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from rigtwin.describing.heading import read_words, split_words, stated_unit
 from rigtwin.describing.joint_names import QUANTITY_WORDS, Alias, list_aliases
+from rigtwin.describing.match import NUMBERED, REMAINING, UNNAMED, Match
 from rigtwin.describing.quantity import ANGULAR, COORDINATES, MEASURED, JointQuantity
 from rigtwin.describing.question import enumerate_names
 from rigtwin.description.joint_elements import actuator_on, movable_joints
@@ -17,40 +17,6 @@ from rigtwin.description.mechanism import Mechanism
 from rigtwin.importing.columns import Columns
 from rigtwin.importing.units import is_unit, unit_of
 from rigtwin.numerics.arrays import Array
-
-NUMBERED = "numbered in the order of the model's joints"
-"""Reason of a match by number."""
-REMAINING = "the only column left for the model's joint"
-"""Reason of a match by elimination."""
-ASSUMED = (NUMBERED, REMAINING)
-"""Reasons of matches that are assumptions."""
-UNNAMED = "its name fits no joint"
-"""Reason why a column is not used."""
-
-
-@dataclass(frozen=True)
-class Match:
-    """Column that a quantity of a joint can be read from.
-
-    Parameters
-    ----------
-    column
-        Name of the column.
-    joint
-        Name of the joint.
-    quantity
-        Quantity that the column holds.
-    why
-        Reason, for the printed table.
-    rank
-        Quality of the match; of two columns for one quantity the higher one is taken.
-    """
-
-    column: str
-    joint: str
-    quantity: JointQuantity
-    why: str
-    rank: float
 
 
 def match_columns(

@@ -23,13 +23,14 @@ from rigtwin.describing.force_signals import (
     suggest_forces,
 )
 from rigtwin.describing.formulas import read_formula
-from rigtwin.describing.heading import read_words, split_words
 from rigtwin.describing.log import Log
-from rigtwin.describing.matching import UNNAMED, Match, match_columns
+from rigtwin.describing.match import Match
+from rigtwin.describing.matching import match_columns
 from rigtwin.describing.position_signals import ask_positions, position_signals
 from rigtwin.describing.quantity import JointQuantity
-from rigtwin.describing.question import Question, ask, enumerate_names, option
+from rigtwin.describing.question import Question, enumerate_names, option
 from rigtwin.describing.replay_kind import ReplayKind, choose_kind, free_swing
+from rigtwin.describing.resting import note_resting
 from rigtwin.describing.schedule_signals import ScheduleColumn, schedule_columns
 from rigtwin.describing.signal import LogSignal
 from rigtwin.describing.slots import Slots
@@ -118,7 +119,7 @@ def read_log(
     # Only forces can be held against inverse dynamics.
     if kind.test in (INVERSE, FORCES):
         signals = check_forces(log, signals, values)
-    _note_resting(log, joints)
+    note_resting(log, joints)
     if log.questions or log.clock is None:
         raise _all_questions(log, signals)
     velocities = [s.joint for s in motions.values() if s.quantity is JointQuantity.VELOCITY]
@@ -193,32 +194,6 @@ def _choose_movers(
     if log.questions:
         raise _all_questions(log, signals)
     return kind, list(movers.values())
-
-
-def _note_resting(log: Log, joints: Sequence[str]) -> None:
-    """Note the joints whose position no column holds, or ask where a column may be that."""
-    resting = [joint for joint in movable_joints(log.mechanism) if joint not in joints]
-    undecided = [j for j in resting if log.slots.stated(j, JointQuantity.POSITION) is None]
-    unnamed = [name for name, why in log.unused.items() if why == UNNAMED and _is_position(name)]
-    if undecided and unnamed:
-        key = f"{undecided[0]}.position"
-        question = ask(
-            f"no column is named as the position of {enumerate_names(undecided)}, and "
-            f"{enumerate_names(unnamed)} {'fits' if len(unnamed) == 1 else 'fit'} no joint",
-            option(key, unnamed[0]),
-            option(key, "none") + " if it rests",
-        )
-        log.questions.append(str(question))
-    elif resting:
-        log.notes.append(
-            f"{enumerate_names(resting)}: no column is the position, so it stays where the model "
-            "has it"
-        )
-
-
-def _is_position(column: str) -> bool:
-    meaning = read_words(split_words(column), "")
-    return meaning.quantity is JointQuantity.POSITION and not meaning.commanded
 
 
 def _open(

@@ -8,7 +8,7 @@ import numpy as np
 
 from rigtwin.describing.corrections import Corrections, Slot, Stated
 from rigtwin.describing.heading import split_words, stated_unit
-from rigtwin.describing.matching import Match
+from rigtwin.describing.match import Match
 from rigtwin.describing.quantity import SI, JointQuantity
 from rigtwin.describing.question import ask, enumerate_names, option
 from rigtwin.importing.columns import Columns

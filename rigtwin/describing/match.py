@@ -1,0 +1,41 @@
+"""Match of a column with a quantity of a joint, and its reasons."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from rigtwin.describing.quantity import JointQuantity
+
+NUMBERED = "numbered in the order of the model's joints"
+"""Reason of a match by number."""
+REMAINING = "the only column left for the model's joint"
+"""Reason of a match by elimination."""
+ASSUMED = (NUMBERED, REMAINING)
+"""Reasons of matches that are assumptions."""
+UNNAMED = "its name fits no joint"
+"""Reason why a column is not used."""
+
+
+@dataclass(frozen=True)
+class Match:
+    """Column that a quantity of a joint can be read from.
+
+    Parameters
+    ----------
+    column
+        Name of the column.
+    joint
+        Name of the joint.
+    quantity
+        Quantity that the column holds.
+    why
+        Reason, for the printed table.
+    rank
+        Quality of the match; of two columns for one quantity the higher one is taken.
+    """
+
+    column: str
+    joint: str
+    quantity: JointQuantity
+    why: str
+    rank: float
