@@ -76,14 +76,26 @@ def read_data(
 
 
 def as_list(recordings: Recorded | Sequence[Recorded]) -> list[Recorded]:
-    """Return one recording (or log) or several as a list."""
+    """Return one recording or several as a list.
+
+    Parameters
+    ----------
+    recordings
+        A recording, or a sequence of them.
+    """
     if isinstance(recordings, Sequence) and not isinstance(recordings, str):
         return list(recordings)
     return [recordings]
 
 
 def has_duplicate(recordings: Sequence[reader.RecordedTest]) -> bool:
-    """Return whether two recordings are the same file. Those in memory have none."""
+    """Return whether two recordings are the same file; those in memory have none.
+
+    Parameters
+    ----------
+    recordings
+        Recordings, those to fit and those held out.
+    """
     # Resolved, since links and relative paths may name one file twice.
     paths = [recording.path.resolve() for recording in recordings if recording.path.exists()]
     return len(set(paths)) < len(paths)
