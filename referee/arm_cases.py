@@ -1,4 +1,4 @@
-"""Random arms with withheld defects, their recordings, and the acceptable answers.
+"""Random arms with withheld defects, and the acceptable answers.
 
 The table of acceptable answers was fixed before the first diagnosis. A name outside a case's row
 is wrong, whatever it explains.

@@ -1,4 +1,4 @@
-"""Root loci of the thesis (§5.2, appendix A): the sweeps, the claims about them, the drawings."""
+"""Root loci of the thesis (§5.2, appendix A): the sweeps and the claims about them."""
 
 from __future__ import annotations
 

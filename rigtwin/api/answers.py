@@ -18,7 +18,7 @@ from rigtwin.diagnosis.data_checks import require_fit
 from rigtwin.diagnosis.diagnose import diagnose as find_reasons
 from rigtwin.diagnosis.first_look import FirstLook as FirstLook
 from rigtwin.diagnosis.result import Diagnosis
-from rigtwin.diagnosis.thresholds import STANDARD
+from rigtwin.diagnosis.thresholds import STANDARD, Thresholds
 from rigtwin.errors import RigtwinError
 from rigtwin.simulation.experiment import find_experiment
 from rigtwin.studies.friction_spikes import Calibration
@@ -123,9 +123,24 @@ def diagnose(
         thresholds=thresholds,
         first_look=first_look,
     )
-    # Settings and exclusions name components, which the other view does not have.
-    stated = bool(settings or without or exclude)
-    if stated or _closed_share(diagnosis) >= MOST or (view := _by_forces(data)) is None:
+    # Settings and exclusions name components, which the view by forces does not have.
+    if settings or without or exclude or _closed_share(diagnosis) >= MOST:
+        return diagnosis
+    return _turn_to_forces(diagnosis, data, thresholds, progress)
+
+
+def _turn_to_forces(
+    diagnosis: Diagnosis,
+    data: DiagnosisData,
+    thresholds: Thresholds,
+    progress: Callable[[str, int], object],
+) -> Diagnosis:
+    """Return the answer about the forces along the motion where it closes most of its gap.
+
+    `diagnosis`, the answer about the motion, is returned otherwise.
+    """
+    view = _by_forces(data)
+    if view is None:
         return diagnosis
     other = find_reasons(
         view.machine,
@@ -165,8 +180,9 @@ def _with_note(diagnosis: Diagnosis, before: Diagnosis) -> Diagnosis:
         "judged by the forces along the measured motion: predicted from the forces, the motion "
         f"departs from the measured one, and the answer would be {before.verdict!r}"
     )
-    answer = replace(diagnosis.answer, notes=(note, *diagnosis.answer.notes))
-    return replace(diagnosis, answer=answer)
+    after = diagnosis.answer
+    seconds = before.answer.seconds + after.seconds
+    return replace(diagnosis, answer=replace(after, notes=(note, *after.notes), seconds=seconds))
 
 
 def what_changed(

@@ -1,4 +1,4 @@
-"""Data acquisition card: virtual card, check of a channel table, release of held lines."""
+"""Data acquisition card: virtual card, and release of held lines."""
 
 from __future__ import annotations
 

@@ -32,7 +32,7 @@ class Recording(reader.RecordedTest):
     described: Machine | None = field(default=None, repr=False)
     """Machine of the recording, if it was stated when the recording was loaded or made."""
     origin: Described | None = field(default=None, repr=False)
-    """How the log was read that the recording was made from. None of any other recording."""
+    """Description of the log that the recording was made from; None of a recorded test."""
     report: tuple[str, ...] = field(default=(), repr=False)
     """Lines about the imported data: gaps, units, columns used. Empty unless it was imported."""
 

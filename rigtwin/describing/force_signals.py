@@ -31,7 +31,7 @@ SHOWN = 0.5
 MOTIONS = (JointQuantity.POSITION, JointQuantity.VELOCITY)
 """Quantities that are no force."""
 COMMANDS = (*MOVING, JointQuantity.VELOCITY_COMMAND, JointQuantity.VOLTAGE)
-"""Quantities of which one moves a joint."""
+"""Quantities of a command or a force, at least one of which says what moves a joint."""
 SUGGESTED = 3
 """Columns of one joint that a question offers."""
 

@@ -96,7 +96,7 @@ def read_words(words: tuple[str, ...], unit: str) -> Meaning:
 
 
 def _without_adjective(words: tuple[str, ...]) -> set[str]:
-    """Words without the adjective of a current position, velocity or force, which is no current."""
+    """Words without "current" where it is an adjective, as in "current position"."""
     # The letter q is no position here: a motor has a current in its q axis.
     quantities = (JointQuantity.POSITION, JointQuantity.VELOCITY, JointQuantity.FORCE)
     others = frozenset().union(*(WORDS[quantity] for quantity in quantities)) - {"q"}

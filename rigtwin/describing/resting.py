@@ -34,5 +34,6 @@ def note_resting(log: Log, joints: Sequence[str]) -> None:
 
 
 def _is_position(column: str) -> bool:
+    """Whether the words of a column's name say that it is a measured position."""
     meaning = read_words(split_words(column), "")
     return meaning.quantity is JointQuantity.POSITION and not meaning.commanded

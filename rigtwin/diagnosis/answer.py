@@ -1,4 +1,8 @@
-"""Answer of a diagnosis."""
+"""The answer of a diagnosis, as frozen data and as the JSON document that other programs read.
+
+Field names are JSON keys, except where `Answer.document` writes the key explicitly. The schema is
+`answer.schema.json`.
+"""
 
 from __future__ import annotations
 

@@ -1,8 +1,4 @@
-"""The answer of a diagnosis, as frozen data and as the JSON document that other programs read.
-
-Field names are JSON keys, except where `Answer.document` writes the key explicitly. The schema is
-`answer.schema.json`.
-"""
+"""Findings of a diagnosis as frozen data: effects with their estimates, places and leftovers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Noise estimated from data: the white part of a signal, the mains line, and the motion beneath."""
+"""Noise estimated from data: the white part of a signal, and the mains line."""
 
 from __future__ import annotations
 

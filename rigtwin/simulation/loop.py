@@ -1,7 +1,7 @@
 """Control loop: read → update → write, tick by tick, until the test ends or a limit trips.
 
-`run` drives any rig through its four verbs. `run_compiled` drives a twin without leaving compiled
-code. Both give the same numbers.
+`run` drives any rig through its four verbs. `compiled_loop.run_compiled` drives a twin without
+leaving compiled code. Both give the same numbers.
 """
 
 from __future__ import annotations
