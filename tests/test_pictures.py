@@ -36,8 +36,9 @@ def finding_of(name: str, **values: float) -> Finding:
 def shown(name: str, **values: float) -> Picture:
     """The picture of an effect on a twin that has it."""
     effect = rig_effect(name)
-    told = ",".join(f"{value:g}" for value in values.values())
-    evidence = evidence_of(recorded("imposed", (f"{name}={told}",), 3.5))
+    first, *others = values.items()
+    stated = ",".join([f"{first[1]:g}", *(f"{key}={value:g}" for key, value in others)])
+    evidence = evidence_of(recorded("imposed", (f"{name}={stated}",), 3.5))
     component = getattr(RIG.plant, effect.group)._replace(**values)
     corrected = RIG.plant._replace(**{effect.group: component})
     return picture(evidence, corrected, finding_of(name, **values))
@@ -83,7 +84,17 @@ def test_a_gain_is_the_slope_of_measured_against_predicted():
     assert np.polyfit(predicted, measured, 1)[0] == pytest.approx(1.1, rel=0.02)
 
 
-@pytest.mark.parametrize("form", FORMS)
+def test_cogging_is_one_wave_over_its_pitch():
+    found = shown("cogging@motor", cogging=20.0, cogging_pitch=0.012, cogging_phase=0.4)
+    assert found.form == "pitch"
+    place, force = curve(found, "measured")
+    assert 0.0 <= place.min() < place.max() <= 0.012
+    wave = np.sin(2.0 * np.pi * place / 0.012 + 0.4)
+    assert abs(np.corrcoef(wave, force)[0, 1]) > 0.95
+
+
+# The pitch is that of an effect which has one, see above.
+@pytest.mark.parametrize("form", sorted({*FORMS} - {"pitch"}))
 def test_every_form_has_measured_data_a_caption_and_finite_numbers(form, monkeypatch):
     monkeypatch.setitem(PICTURES, "gain", form)
     found = shown("gain@load_cell", gain=1.1)

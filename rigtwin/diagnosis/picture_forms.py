@@ -88,6 +88,14 @@ def _by_position(view: View) -> Picture:
     return _against(view, view.motion.position, "position", "position", unit)
 
 
+def _by_pitch(view: View) -> Picture:
+    unit = "rad" if view.angular else "m"
+    # Many waves along a stroke would fall between the bins; all pitches lie on one another.
+    place = np.mod(view.motion.position, view.effect.parameters["cogging_pitch"].value)
+    along_what = f"the position of the {view.part} within one pitch"
+    return _against(view, place, "pitch", "position within one pitch", unit, along_what)
+
+
 def _by_acceleration(view: View) -> Picture:
     unit = "rad/s²" if view.angular else "m/s²"
     # Central differences have no delay, which would turn the averages into a loop.
@@ -286,6 +294,7 @@ def _by_time(view: View) -> Picture:
 FORMS: dict[str, Callable[[View], Picture]] = {
     "velocity": _by_velocity,
     "position": _by_position,
+    "pitch": _by_pitch,
     "acceleration": _by_acceleration,
     "record": _over_record,
     "loop": _loop,

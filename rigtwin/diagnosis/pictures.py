@@ -34,7 +34,7 @@ PICTURES: dict[str, str] = {
     "drag": "velocity",
     "damping": "velocity",
     "damping_gain": "velocity",
-    "cogging": "position",
+    "cogging": "pitch",
     "position_force": "position",
     "end_stops": "position",
     "mass": "acceleration",
