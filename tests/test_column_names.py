@@ -103,3 +103,20 @@ def test_counts_of_an_encoder_tell_degrees_from_percent(
 )
 def test_the_current_position_is_no_current(column: str, quantity: JointQuantity) -> None:
     assert read_words(split_words(column), "").quantity is quantity
+
+
+def test_the_current_of_a_motor_is_its_force_where_the_models_constant_agrees(
+    tmp_path: Path,
+) -> None:
+    current = INERTIA * ACCELERATION / TORQUE_CONSTANT
+    columns = {"shaft_pos": SWING, "current (mA)": 1e3 * current}
+    assert sources(tmp_path, SHAFT, columns)["shaft.force"] == "current"
+    log = write_log(tmp_path / "log.csv", {"time": TIME, **columns})
+    force = rigtwin.describe(tmp_path / "model.xml", log).record()["/sensor.shaft_force"]
+    assert force == pytest.approx(INERTIA * ACCELERATION, abs=1e-6)
+
+
+def test_a_current_of_another_constant_is_asked_about(tmp_path: Path) -> None:
+    current = 3.0 * INERTIA * ACCELERATION / TORQUE_CONSTANT
+    with pytest.raises(RigtwinError, match="is it that force"):
+        sources(tmp_path, SHAFT, {"shaft_pos": SWING, "current (A)": current})

@@ -174,7 +174,8 @@ def test_actuator_conditioning_in_closed_form():
     assert np.array_equal(through(Motor(), sine, Computer(delay=0.0101)), late)
     step = np.where(time < 0.05, 0.0, 1.0)
     lagged = through(Motor(lag=0.02), step)
-    exact = np.where(time < 0.05, 0.0, 1 - np.exp(-(time + STEP - 0.05) / 0.02))
+    fall = np.exp(-(time - 0.05) / 0.02) * (1.0 - np.exp(-STEP / 0.02))
+    exact = np.where(time < 0.05, 0.0, 1.0 - 0.02 / STEP * fall)
     assert np.max(np.abs(lagged - exact)) < 1e-9
     assert np.max(through(Motor(gain=1.1), sine) - 1.1 * sine) == 0.0
     assert np.max(through(Motor(saturation=1.2), sine)) == 1.2

@@ -10,7 +10,7 @@ import pytest
 
 import rigtwin
 from rigtwin.describing.described import Described
-from rigtwin.describing.force_view import judge_by_forces, with_forces
+from rigtwin.describing.force_view import judge_otherwise, with_channels
 from rigtwin.numerics.arrays import Array
 from tests.helpers.logs import write_log
 
@@ -65,13 +65,48 @@ def test_cogging_that_no_simulation_follows_is_found_along_the_motion(tmp_path: 
 def test_the_command_times_its_gear_is_the_force(tmp_path: Path, gear: float) -> None:
     log = follow(0.0, 6)
     described = describe(tmp_path, log, gear)
-    view = judge_by_forces(described)
+    view = judge_otherwise(described)
     assert view is not None
-    force = with_forces(described, view, described.record())["/sensor.axis_force"]
+    force = with_channels(described, view, described.record())["/sensor.axis_force"]
     assert force == pytest.approx(log["F"], abs=1e-5 * np.max(np.abs(log["F"])))
     # Reading the log as such a test gives the same channel.
     assert force == pytest.approx(view.record()["/sensor.axis_force"], rel=1e-9)
 
 
 def test_what_its_owner_stated_has_no_other_view(tmp_path: Path) -> None:
-    assert judge_by_forces(describe(tmp_path, follow(0.0, 7), test="force commands")) is None
+    assert judge_otherwise(describe(tmp_path, follow(0.0, 7), test="force commands")) is None
+
+
+ROD = """<mujoco><option gravity="0 0 -9.81"/><worldbody><body name="rod">
+<joint name="pivot" axis="0 1 0" damping="0.05"/>
+<inertial pos="0 0 -0.2" mass="0.6" diaginertia="0.004 0.004 0.004"/></body></worldbody>
+<actuator><motor name="drive" joint="pivot"/></actuator></mujoco>"""
+INERTIA, GRAVITY = 0.004 + 0.6 * 0.2**2, 0.6 * 9.81 * 0.2
+
+
+def swing(limit: float) -> dict[str, Array]:
+    """Time, commanded torque and angle of a rod whose drive gives no more than `limit`."""
+    random = np.random.default_rng(8)
+    time, angles = PERIOD * np.arange(ROWS), np.zeros(ROWS)
+    torques = 0.5 * np.sin(2.1 * time) + 0.3 * np.sin(4.7 * time + 1.0)
+    q = v = 0.0
+    for row in range(ROWS):
+        angles[row], given = q, min(max(torques[row], -limit), limit)
+        for _ in range(STEPS):
+            v += PERIOD / STEPS / INERTIA * (given - 0.05 * v - GRAVITY * math.sin(q))
+            q += PERIOD / STEPS * v
+    return {"t": time, "tau": torques, "q": angles + 1e-4 * random.standard_normal(ROWS)}
+
+
+@pytest.mark.slow
+def test_a_torque_that_the_drive_did_not_give_is_judged_as_a_command(tmp_path: Path) -> None:
+    model = tmp_path / "rod.xml"
+    model.write_text(ROD)
+    log = write_log(tmp_path / "log.csv", swing(0.45))
+    assert rigtwin.describe(model, log).reading.kind.test == "inverse dynamics"
+    answer = rigtwin.diagnose(log, machine=model)
+    assert answer.verdict == "explained"
+    (finding,) = answer.effects
+    assert str(finding.name) == "saturation@drive"
+    assert finding.parameters["saturation"].value == pytest.approx(0.45, rel=0.03)
+    assert "taken as commands" in answer.answer.notes[0]

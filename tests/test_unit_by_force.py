@@ -200,7 +200,7 @@ def test_a_velocity_tells_rad_from_degrees(tmp_path: Path, unit: str, rate: str)
     assert position.assumed[0] == f"{unit} by 'speed', which is its rate in {rate}"
 
 
-def test_a_torque_before_the_gear_is_asked_about_and_tells_the_unit(tmp_path: Path):
+def test_a_torque_before_the_models_gear_is_scaled_and_tells_the_unit(tmp_path: Path):
     gear, gravity = 30.0, 2.0
     path = tmp_path / "arm.xml"
     path.write_text(
@@ -214,7 +214,9 @@ def test_a_torque_before_the_gear_is_asked_about_and_tells_the_unit(tmp_path: Pa
     motion["torque"] *= inertia / INERTIA
     motion["torque"] += gravity * np.sin(motion["angle"])
     motion["motor_torque"] = motion.pop("torque") / gear
-    with pytest.raises(RigtwinError, match="before a gear") as raised:
-        rigtwin.describe(path, write_log(tmp_path / "log.csv", motion))
-    assert "rad by the forces, of which the model explains" in str(raised.value)
-    assert 'shaft.force=30 * motor_torque"' in str(raised.value)
+    answer = rigtwin.describe(path, write_log(tmp_path / "log.csv", motion))
+    assumed = "; ".join(answer.assumptions)
+    assert "rad by the forces, of which the model explains" in assumed
+    assert "before the gear of the model's actuator: times 30" in assumed
+    force = answer.record()["/sensor.shaft_force"]
+    assert force == pytest.approx(gear * motion["motor_torque"])

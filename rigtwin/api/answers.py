@@ -10,7 +10,7 @@ from rigtwin.api.diagnosis_data import DiagnosisData, Recorded, as_list, has_dup
 from rigtwin.api.machines import described_machine, machine_of
 from rigtwin.api.recordings import Recording, resolve_recording
 from rigtwin.api.twin import Settings, names_of, require_unrecorded, twin_of
-from rigtwin.describing.force_view import judge_by_forces, with_forces
+from rigtwin.describing.force_view import REASONS, judge_otherwise, with_channels
 from rigtwin.description.machine import Machine
 from rigtwin.diagnosis.change import Changes
 from rigtwin.diagnosis.changes import find_changes
@@ -24,8 +24,8 @@ from rigtwin.simulation.experiment import find_experiment
 from rigtwin.studies.friction_spikes import Calibration
 
 MOST = 0.5
-"""Share of the gap below which an answer about a driven motion is poor, and which one about the
-forces along it must close to take its place."""
+"""Share of the gap below which an answer is poor, and which the answer of the other view must close
+to take its place."""
 LEAST_DETECTED, MOST_FALSE = 0.8, 0.1
 """Least share of reversals that a friction compensator detects, and most false steps per reversal,
 on the recording it was identified from."""
@@ -123,25 +123,26 @@ def diagnose(
         thresholds=thresholds,
         first_look=first_look,
     )
-    # Settings and exclusions name components, which the view by forces does not have.
+    # Settings and exclusions name components, which the other view does not have.
     if settings or without or exclude or _closed_share(diagnosis) >= MOST:
         return diagnosis
-    return _turn_to_forces(diagnosis, data, thresholds, progress)
+    return _look_otherwise(diagnosis, data, thresholds, progress)
 
 
-def _turn_to_forces(
+def _look_otherwise(
     diagnosis: Diagnosis,
     data: DiagnosisData,
     thresholds: Thresholds,
     progress: Callable[[str, int], object],
 ) -> Diagnosis:
-    """Return the answer about the forces along the motion where it closes most of its gap.
+    """Return the answer of the other view, see `force_view`, where it closes most of its gap.
 
-    `diagnosis`, the answer about the motion, is returned otherwise.
+    `diagnosis`, the answer of the first view, is returned otherwise.
     """
-    view = _by_forces(data)
-    if view is None:
+    seen = _other_view(data)
+    if seen is None:
         return diagnosis
+    view, reason = seen
     other = find_reasons(
         view.machine,
         view.recordings,
@@ -151,7 +152,7 @@ def _turn_to_forces(
         progress=progress,
         thresholds=thresholds,
     )
-    return _with_note(other, diagnosis) if _closed_share(other) >= MOST else diagnosis
+    return _with_note(other, diagnosis, reason) if _closed_share(other) >= MOST else diagnosis
 
 
 def _closed_share(diagnosis: Diagnosis) -> float:
@@ -161,26 +162,23 @@ def _closed_share(diagnosis: Diagnosis) -> float:
     return diagnosis.gap.shrinkage_held_out.value if diagnosis.effects else 0.0
 
 
-def _by_forces(data: DiagnosisData) -> DiagnosisData | None:
-    """Return logs of force commands with the motion prescribed; None for any other recordings."""
+def _other_view(data: DiagnosisData) -> tuple[DiagnosisData, str] | None:
+    """Return logs in their other view, and what it is; None for recordings that have none."""
     first = data.recordings[0]
     origin = first.origin if isinstance(first, Recording) else None
-    if origin is None or (view := judge_by_forces(origin)) is None:
+    if origin is None or (view := judge_otherwise(origin)) is None:
         return None
     fitted, judged = (
-        tuple(with_forces(origin, view, recording) for recording in recordings)
+        tuple(with_channels(origin, view, recording) for recording in recordings)
         for recordings in (data.recordings, data.held_out)
     )
-    return DiagnosisData(view.machine, fitted, judged)
+    return DiagnosisData(view.machine, fitted, judged), REASONS[view.reading.kind.test]
 
 
-def _with_note(diagnosis: Diagnosis, before: Diagnosis) -> Diagnosis:
+def _with_note(diagnosis: Diagnosis, before: Diagnosis, reason: str) -> Diagnosis:
     """Return an answer with a note on the view that it replaces."""
-    note = (
-        "judged by the forces along the measured motion: predicted from the forces, the motion "
-        f"departs from the measured one, and the answer would be {before.verdict!r}"
-    )
     after = diagnosis.answer
+    note = f"{reason}; otherwise the answer would be {before.verdict!r}"
     seconds = before.answer.seconds + after.seconds
     return replace(diagnosis, answer=replace(after, notes=(note, *after.notes), seconds=seconds))
 

@@ -10,6 +10,9 @@ With the command u[k] at step k, the order of operations is
     rate limit  y ← y + clip(u − y, −rate, rate)
     lag         z ← z + (1 − exp(−h/T))·(y − z)
 
+What acts over a step is the mean of the lag's output z over it. Its value at the end of the step
+would act half a step early.
+
 All of them are neutral in the nominal machine, whose commands pass unchanged.
 """
 
@@ -47,13 +50,16 @@ class Actuator(NamedTuple):
     saturation: float  # Largest magnitude after the gain.
     rate: float  # Largest change in a timestep.
     share: float  # Share of the remaining distance that the lag covers in a timestep.
+    mean_share: float  # Share that it covers on average over the timestep.
 
 
 class ActuatorState(NamedTuple):
     """State of a command's conditioning; changed in place."""
 
     history: Array  # Past commands, a ring buffer.
-    memory: Array  # Position in the ring, output of deadband, of rate limit, of lag; shape (4,).
+    memory: (
+        Array  # Position in the ring, output of deadband, of rate limit, of lag, last output; (5,).
+    )
 
 
 def actuator(component: Motor | Cylinder | Pusher, computer: Computer, timestep: float) -> Actuator:
@@ -92,7 +98,11 @@ def actuator(component: Motor | Cylinder | Pusher, computer: Computer, timestep:
         UNLIMITED,
         0.0,
     )
-    share = 1.0 if component.lag == 0.0 else 1.0 - math.exp(-timestep / component.lag)
+    share = mean_share = 1.0
+    if component.lag > 0.0:
+        steps = timestep / component.lag
+        share = -math.expm1(-steps)
+        mean_share = 1.0 - share / steps
     return Actuator(
         neutral=neutral,
         low=component.command_low if isinstance(component, PUSHERS) else -UNLIMITED,
@@ -106,13 +116,16 @@ def actuator(component: Motor | Cylinder | Pusher, computer: Computer, timestep:
         saturation=saturation,
         rate=rate * timestep if rate < UNLIMITED else UNLIMITED,
         share=share,
+        mean_share=mean_share,
     )
 
 
 def hold(conditioning: Actuator, command: float) -> ActuatorState:
     """Return the state after a command, in its unit, has been held for long."""
     command = min(max(command, conditioning.low), conditioning.high)
-    state = ActuatorState(ring(conditioning.delay, command), np.array([0.0, command, 0.0, 0.0]))
+    state = ActuatorState(
+        ring(conditioning.delay, command), np.array([0.0, command, 0.0, 0.0, 0.0])
+    )
     state.memory[2:] = limit(conditioning, state, command)
     return state
 
@@ -150,15 +163,17 @@ def condition(conditioning: Actuator, state: ActuatorState, command: float) -> f
     command = min(max(command, conditioning.low), conditioning.high)
     # The usual case in a search for other effects: skip the work, but keep the last output.
     if conditioning.neutral:
-        state.memory[3] = command
+        state.memory[3] = state.memory[4] = command
         return command
     wanted = limit(
         conditioning, state, delay_sample(state.history, state.memory, conditioning.delay, command)
     )
     before = state.memory[2]
     state.memory[2] = before + min(max(wanted - before, -conditioning.rate), conditioning.rate)
-    state.memory[3] += conditioning.share * (state.memory[2] - state.memory[3])
-    return state.memory[3]
+    lacking = state.memory[2] - state.memory[3]
+    state.memory[4] = state.memory[3] + conditioning.mean_share * lacking
+    state.memory[3] += conditioning.share * lacking
+    return state.memory[4]
 
 
 @kernel

@@ -9,13 +9,14 @@ import numpy as np
 
 from rigtwin.describing.checks import Slope, force_slopes, is_magnitude
 from rigtwin.describing.log import STATED, Log
-from rigtwin.describing.match import REMAINING, UNNAMED, Match
+from rigtwin.describing.match import MOTOR_CURRENT, REMAINING, UNNAMED, Match
 from rigtwin.describing.quantity import SI, JointQuantity
 from rigtwin.describing.question import Question, ask, enumerate_names, option
 from rigtwin.describing.replay_kind import MOVING, takes_force
 from rigtwin.describing.signal import LogSignal
 from rigtwin.describing.units import Unit, actuator_constant, force_unit
 from rigtwin.description.joint_elements import actuator_on
+from rigtwin.importing.units import unit_of
 from rigtwin.numerics.arrays import Array
 
 NEAR_GEAR = 2.0
@@ -51,9 +52,10 @@ def force_signals(
     forces: dict[str, LogSignal] = {}
     still: list[str] = []
     for joint in positions:
-        if not log.slots.has(joint, JointQuantity.FORCE):
-            continue
-        signal = force_signal(log, joint)
+        if log.slots.has(joint, JointQuantity.FORCE):
+            signal = force_signal(log, joint)
+        else:
+            signal = _motor_current(log, joint, positions)
         if signal is None:
             continue
         if np.any(log.values(signal)):
@@ -102,6 +104,36 @@ def force_signal(log: Log, joint: str) -> LogSignal | None:
         unit=unit.name,
         why=match.why,
         assumed=(unit.assumed,) if unit.assumed else (),
+    )
+
+
+def _motor_current(log: Log, joint: str, positions: Mapping[str, Array]) -> LogSignal | None:
+    """Return the current of a joint's motor as its force; None where that is not evident.
+
+    The gear of a motor whose control is a current is its force constant. It is taken for that where
+    the model's inverse dynamics explain the current, with a constant near the gear.
+    """
+    actuator = actuator_on(log.mechanism, joint)
+    columns = log.slots.columns(joint, JointQuantity.CURRENT)
+    if actuator is None or log.mechanism.positions(actuator) or len(columns) != 1:
+        return None
+    constant = actuator_constant(log.mechanism, actuator)
+    slope = _slope(log, joint, positions, log.columns.values[columns[0]])
+    if constant in (0.0, 1.0) or slope is None or slope.explained < SHOWN:
+        return None
+    unit = log.columns.units.get(columns[0], "") or "A"
+    ratio = abs(slope.slope * constant * unit_of(unit)[1])
+    if not 1.0 / NEAR_GEAR < ratio < NEAR_GEAR:
+        return None
+    si = SI[JointQuantity.FORCE][log.mechanism.turns(joint)]
+    return LogSignal(
+        joint=joint,
+        quantity=JointQuantity.FORCE,
+        column=columns[0],
+        unit=unit,
+        scale=constant,
+        why=MOTOR_CURRENT,
+        assumed=(f"times the gear of the model's actuator, {constant:g} {si}/A",),
     )
 
 
@@ -244,9 +276,14 @@ def _factor(log: Log, joint: str, ratio: float) -> float:
 
     It is the gear of the model's actuator where that is near the inverse of `ratio`.
     """
-    actuator = actuator_on(log.mechanism, joint)
-    gear = actuator_constant(log.mechanism, actuator) if actuator is not None else 1.0
+    gear = _gear(log, joint)
     return gear if gear > 1.0 and 1.0 / NEAR_GEAR < gear * ratio < NEAR_GEAR else 1.0 / ratio
+
+
+def _gear(log: Log, joint: str) -> float:
+    """Force of the joint's actuator for each unit of its control, 1 without an actuator."""
+    actuator = actuator_on(log.mechanism, joint)
+    return actuator_constant(log.mechanism, actuator) if actuator is not None else 1.0
 
 
 def _check_force(log: Log, signal: LogSignal, slope: Slope) -> LogSignal:
@@ -274,11 +311,17 @@ def _check_force(log: Log, signal: LogSignal, slope: Slope) -> LogSignal:
     is_clear = SLOPE_LOW < abs(ratio) < SLOPE_HIGH
     has_unit = signal.quantity is JointQuantity.FORCE and not signal.assumed
     is_possible = is_clear or (has_unit and SLOPE_LOW < abs(ratio) < SLOPE_HIGHEST)
-    if not stated and not is_possible:
+    gear = _factor(log, signal.joint, abs(ratio))
+    is_before_gear = signal.quantity is JointQuantity.FORCE and gear == _gear(log, signal.joint)
+    if not stated and not is_possible and is_before_gear:
+        text = f"before the gear of the model's actuator: times {gear:g}"
+        signal = replace(signal, scale=gear, assumed=(*signal.assumed, text))
+        ratio, is_clear = ratio * gear, True
+    elif not stated and not is_possible:
         question = ask(
             f"column {signal.column!r} is {abs(ratio):.3g} times the force that the model needs at "
             f"{signal.joint}; is it in another unit, or before a gear?",
-            option(signal.key, f"{_factor(log, signal.joint, ratio):.4g} * {signal.column}"),
+            option(signal.key, f"{gear:.4g} * {signal.column}"),
             option(signal.key, f"{signal.column} [{signal.unit}]") + " if it is right",
         )
         log.questions.append(str(question))

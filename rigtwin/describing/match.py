@@ -10,7 +10,9 @@ NUMBERED = "numbered in the order of the model's joints"
 """Reason of a match by number."""
 REMAINING = "the only column left for the model's joint"
 """Reason of a match by elimination."""
-ASSUMED = (NUMBERED, REMAINING)
+MOTOR_CURRENT = "the current of the joint's motor"
+"""Reason of a force that is read from a current."""
+ASSUMED = (NUMBERED, REMAINING, MOTOR_CURRENT)
 """Reasons of matches that are assumptions."""
 UNNAMED = "its name fits no joint"
 """Reason why a column is not used."""

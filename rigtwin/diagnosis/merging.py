@@ -1,14 +1,15 @@
-"""Starts with one effect in the place of two.
+"""Starts with one effect in the place of two, or of all effects of one component.
 
 A delay of all commands resembles viscous friction at every joint, and the mass of a link resembles
-friction and gravity at two. A search that began with such effects cannot replace them one by one:
-beside one of them, the effect that is present explains little.
+friction and gravity at two. Dry, quadratic and Stribeck friction of one joint together resemble its
+viscous friction. A search that began with such effects cannot replace them one by one: beside the
+others, the effect that is present explains little.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import combinations
+from itertools import chain, combinations
 
 from rigtwin.components import Effect
 from rigtwin.diagnosis.fit import Fit, clashes, is_possible, with_values
@@ -19,7 +20,7 @@ from rigtwin.diagnosis.starts import LATE_BY_TIME, Start
 from rigtwin.diagnosis.threads import Threads
 
 SUBSTITUTES = 2
-"""Number of effects tried in the place of each two."""
+"""Number of effects tried in the place of each merged set."""
 
 
 def start_merged(
@@ -29,7 +30,7 @@ def start_merged(
     candidates: Sequence[Effect],
     threads: Threads,
 ) -> list[Start]:
-    """Start a hypothesis with one effect in the place of each two.
+    """Start a hypothesis with one effect in the place of two, or of all of a component.
 
     Parameters
     ----------
@@ -50,9 +51,10 @@ def start_merged(
         Effects, and the values from which they are fitted.
     """
     starts: list[Start] = []
-    for pair in combinations(range(len(leader.effects)), 2):
-        effects = tuple(e for number, e in enumerate(leader.effects) if number not in pair)
-        values = tuple(v for number, v in enumerate(leader.values) if number not in pair)
+    pairs = combinations(range(len(leader.effects)), 2)
+    for merged in chain(pairs, _find_crowded_components(leader)):
+        effects = tuple(e for number, e in enumerate(leader.effects) if number not in merged)
+        values = tuple(v for number, v in enumerate(leader.values) if number not in merged)
         possible = [
             candidate
             for candidate in candidates
@@ -62,7 +64,7 @@ def start_merged(
         ]
         without = fitter.evidence.residual(with_values(fitter.plant, effects, values))
         missing = without - fitter.residual_at(leader)
-        imitator = Imitator(fitter, leader, linearised, pair, (missing,))
+        imitator = Imitator(fitter, leader, linearised, merged, (missing,))
         imitations = threads.spread(imitator.imitate, possible)
         # `sorted` is stable, so that candidates that resemble alike keep their order.
         ranked = sorted(imitations, key=lambda imitation: -imitation.cosine)[:SUBSTITUTES]
@@ -72,6 +74,14 @@ def start_merged(
             if close.cosine > RESEMBLES
         ]
     return starts
+
+
+def _find_crowded_components(fit: Fit) -> list[tuple[int, ...]]:
+    """Return the numbers of the effects of each component that has more than two."""
+    numbers: dict[str, list[int]] = {}
+    for number, effect in enumerate(fit.effects):
+        numbers.setdefault(effect.group, []).append(number)
+    return [tuple(members) for members in numbers.values() if len(members) > 2]
 
 
 def start_with_summed_delays(leader: Fit) -> list[Start]:

@@ -218,7 +218,7 @@ def integrate_pushed(
     plays = drive.play.half > 0.0
     follows = depends_on_motion(law)
     # What the step before leaves: a servo's conditioned command, or a force actuator's force.
-    last = drive.held.memory[3] if follows else 0.0
+    last = drive.held.memory[4] if follows else 0.0
     # A mount whose oscillation with the mass is faster than the step, c·m < h², counts as rigid.
     yields = guide_step.guide.mount_compliance * mass > SHORTEST * h * h
     for tick in range(len(disturbance)):

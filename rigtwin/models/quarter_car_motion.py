@@ -62,8 +62,8 @@ def _plate(
 ) -> None:
     """Move a cylinder by its commands; write `position` and `onward` as in `PlateMotion`."""
     for tick in range(len(commands)):
-        # `held.memory[3]` is the last conditioned command, which still acts at this tick.
-        onward[tick] = next_position(model, state, held.memory[3])
+        # `held.memory[4]` is the last conditioned command, which still acts at this tick.
+        onward[tick] = next_position(model, state, held.memory[4])
         for step in range(steps):
             position[tick * steps + step] = state.position[0]
             advance_cylinder(model, state, condition(conditioning, held, commands[tick]))
@@ -104,7 +104,7 @@ def move_plate(
     conditioning = actuator(cylinder, computer, timestep)
     held = hold(conditioning, start)
     out = PlateMotion(np.empty(len(commands) * steps + 1), np.empty(len(commands)))
-    state = rest_state(cylinder, float(held.memory[3]) if at is None else at)
+    state = rest_state(cylinder, float(held.memory[4]) if at is None else at)
     _plate(
         model=discretise(cylinder, timestep),
         state=state,

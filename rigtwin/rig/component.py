@@ -95,7 +95,7 @@ def replay_cylinder(
     out, timestep = np.empty(len(commands)), configuration.timing.timestep
     conditioning = actuator(cylinder, configuration.plant.computer, timestep)
     command = hold(conditioning, start)
-    state = rest_state(cylinder, float(command.memory[3]) if position is None else position)
+    state = rest_state(cylinder, float(command.memory[4]) if position is None else position)
     model = discretise(cylinder, timestep)
     _cylinder(
         model=model,

@@ -90,7 +90,7 @@ class Simulation:
             hold(drives[1], structure),
             hold(drives[2], preload / plant.motor.constant),
         ]
-        ground_position = float(held[0].memory[3])
+        ground_position = float(held[0].memory[4])
         view.qpos[view.ground] = ground_position
         carriage = (
             ground_position + initial_yield(plant, preload)[0] - initial_deflection(plant, preload)
@@ -159,8 +159,8 @@ def sense(state: PlantState) -> Measurements:
     # transmits the force that accelerates the carriage with the plate, which a velocity one
     # timestep old would not show.
     onward = (
-        next_position(state.ground, state.ground_state, state.ground_command.memory[3]),
-        next_position(state.structure, state.structure_state, state.structure_command.memory[3]),
+        next_position(state.ground, state.ground_state, state.ground_command.memory[4]),
+        next_position(state.structure, state.structure_state, state.structure_command.memory[4]),
     )
     move_plates(state, (state.ground_state.position[0], state.structure_state.position[0]), onward)
     forward(state.mechanics.model, state.mechanics.data, 0, 0)
@@ -218,8 +218,8 @@ def advance(
             structure_command=structure_command,
             voltage=voltage,
         )
-        state.ground_command.memory[3] = ground_command
-        state.structure_command.memory[3] = structure_command
+        state.ground_command.memory[3:] = ground_command
+        state.structure_command.memory[3:] = structure_command
         return
     mechanics, now = state.mechanics, state.contacts
     for _ in range(state.substeps):

@@ -84,9 +84,10 @@ def test_a_gain_differs_by_half_its_asymmetry_each_way():
 @pytest.mark.parametrize("component", ACTUATORS)
 @pytest.mark.parametrize("lag", [0.004, 0.03])
 def test_a_lag_answers_a_jump_with_an_exponential(component, lag):
-    """y = 1 − 0.8 exp(−(t − t₀)/T), a step later as a command acts over the coming step."""
-    since = np.maximum(TIME + STEP - 0.1, 0.0)
-    expected = 1.0 - 0.8 * np.exp(-since / lag)
+    """The mean of y = 1 − 0.8 exp(−(t − t₀)/T) over the coming step, in which the command acts."""
+    since = np.maximum(TIME - 0.1, 0.0)
+    falls = np.exp(-since / lag) - np.exp(-(since + STEP) / lag)
+    expected = np.where(TIME < 0.1 - 0.5 * STEP, 0.2, 1.0 - 0.8 * lag / STEP * falls)
     assert passed(component._replace(lag=lag), JUMP) == pytest.approx(expected, abs=1e-9)
 
 
