@@ -20,15 +20,6 @@ def compilable(function: Function) -> Function:
     return register_jitable(error_model="numpy")(function)
 
 
-def inlined(function: Function) -> Function:
-    """Mark a part of a loop as `compilable`, and copy it into each compiled caller.
-
-    A call in every step would pass all of its arguments in memory and count every array among them
-    as a reference. Copied, the part costs as much as if it were written in its caller.
-    """
-    return register_jitable(inline="always", error_model="numpy")(function)
-
-
 def compiled(function: Function) -> Function:
     """Compile a function of numbers and arrays for all callers: a loop that Python is slow at.
 

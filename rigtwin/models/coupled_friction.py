@@ -17,10 +17,9 @@ import math
 
 import numpy as np
 
-from controllers.compiled import inlined
 from rigtwin.models.forward_arrays import GuideContacts, State, WorkSpace
 from rigtwin.numerics.cholesky import solve
-from rigtwin.numerics.compiling import kernel
+from rigtwin.numerics.compiling import kernel, part_kernel
 
 SWEEPS = 200
 """Maximum number of Gauss-Seidel sweeps."""
@@ -76,7 +75,7 @@ def bear(
     return min(max(force, -backward), forward)
 
 
-@inlined
+@part_kernel
 def find_responses(contacts: GuideContacts, free: np.ndarray, h: float, work: WorkSpace) -> float:
     """Find velocities without dry friction, and their response to 1 N of friction at each guide.
 
@@ -103,7 +102,7 @@ def find_responses(contacts: GuideContacts, free: np.ndarray, h: float, work: Wo
     return largest
 
 
-@inlined
+@part_kernel
 def rub(contacts: GuideContacts, free: np.ndarray, state: State, h: float, work: WorkSpace) -> None:
     """Find the dry friction of all guides, and subtract its effect from the free velocities."""
     guides, loose = len(contacts.springs), len(free)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 
-from controllers.compiled import inlined
 from rigtwin.components import Guide
 from rigtwin.components.dry_friction import dry_limits
 from rigtwin.components.guide_force import damping, position_force, quick_damping
@@ -13,9 +12,10 @@ from rigtwin.components.mount import MountState, give_way
 from rigtwin.components.servo import pull, push
 from rigtwin.models.forward_arrays import GuideContacts, Servos, State, StepInputs, WorkSpace
 from rigtwin.models.joint_motion import SHORTEST
+from rigtwin.numerics.compiling import part_kernel
 
 
-@inlined
+@part_kernel
 def push_coordinates(inputs: StepInputs, number: int, work: WorkSpace) -> None:
     """Add up the force actuators' forces over step `number`, and those up to it."""
     # The sensors at this step see the force of the command held before it; the step from here is
@@ -29,7 +29,7 @@ def push_coordinates(inputs: StepInputs, number: int, work: WorkSpace) -> None:
             work.earlier_push[i] += inputs.levers[a, i] * earlier
 
 
-@inlined
+@part_kernel
 def serve(servos: Servos, state: State, number: int, h: float, work: WorkSpace) -> None:
     """Add the servos' forces over step `number`, but for the implicit share of their damping."""
     size = len(work.pushed)
@@ -62,7 +62,7 @@ def serve(servos: Servos, state: State, number: int, h: float, work: WorkSpace) 
             work.earlier_push[i] += servos.levers[a, i] * before
 
 
-@inlined
+@part_kernel
 def hold_back(
     contacts: GuideContacts, g: int, guide: Guide, load: float, h: float, state: State, place: float
 ) -> float:
@@ -79,7 +79,7 @@ def hold_back(
     return force
 
 
-@inlined
+@part_kernel
 def resist_explicitly(
     contacts: GuideContacts, inputs: StepInputs, state: State, tick: int, h: float, work: WorkSpace
 ) -> None:

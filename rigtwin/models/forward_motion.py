@@ -19,7 +19,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from controllers.compiled import inlined
 from rigtwin.components.dry_friction import slide
 from rigtwin.components.guide_force import damping
 from rigtwin.models.bodies import Bodies, find_terms
@@ -28,10 +27,10 @@ from rigtwin.models.forward_arrays import GuideContacts, Servos, State, StepInpu
 from rigtwin.models.forward_forces import push_coordinates, resist_explicitly, serve
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.cholesky import factor, solve
-from rigtwin.numerics.compiling import loop_kernel
+from rigtwin.numerics.compiling import loop_kernel, part_kernel
 
 
-@inlined
+@part_kernel
 def assemble(
     contacts: GuideContacts,
     servos: Servos,
@@ -71,7 +70,7 @@ def assemble(
                 work.system[a, b] += h * weight * along * servos.levers[g, free[b]]
 
 
-@inlined
+@part_kernel
 def accelerate(
     inputs: StepInputs,
     free: np.ndarray,
@@ -97,7 +96,7 @@ def accelerate(
             work.right[a] -= work.inertia[i, j] * (work.ahead_speed[j] - state.speed[j])
 
 
-@inlined
+@part_kernel
 def update_guides(contacts: GuideContacts, state: State, h: float, work: WorkSpace) -> None:
     """Update the internal states of the guides, and complete their forces, at the new velocity."""
     for g in range(len(contacts.springs)):
@@ -122,7 +121,7 @@ def update_guides(contacts: GuideContacts, state: State, h: float, work: WorkSpa
             state.slider[g] += by
 
 
-@inlined
+@part_kernel
 def required_force(
     contacts: GuideContacts,
     inputs: StepInputs,

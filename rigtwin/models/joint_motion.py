@@ -23,7 +23,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from controllers.compiled import compilable, inlined
+from controllers.compiled import compilable
 from controllers.formula_program import Program, run
 from rigtwin.components.conditioning import Actuator, ActuatorState, condition
 from rigtwin.components.guide_force import damping
@@ -33,7 +33,7 @@ from rigtwin.components.sensors import Transducer, TransducerState, transduce
 from rigtwin.components.servo import Play, Push, depends_on_motion, pull, push
 from rigtwin.models.joint_step import step_behind_play, step_joint
 from rigtwin.numerics.arrays import Array
-from rigtwin.numerics.compiling import loop_kernel
+from rigtwin.numerics.compiling import loop_kernel, part_kernel
 
 FURTHEST = 1e12
 """Largest position that is looked up in the gravity grid, in grid spacings."""
@@ -110,7 +110,7 @@ def gravity(inertia: Inertia, position: float) -> float:
     return (1.0 - part) * inertia.load[whole] + part * inertia.load[whole + 1]
 
 
-@inlined
+@part_kernel
 def compute_command(loop: Loop, tick: int, x: float, v: float, period: float) -> float:
     """Return the controller's command at a tick, and advance the states of its sensors.
 
@@ -139,7 +139,7 @@ def compute_command(loop: Loop, tick: int, x: float, v: float, period: float) ->
     return run(loop.program.operations, loop.registers, loop.memory, period)
 
 
-@inlined
+@part_kernel
 def push_joint(
     drive: Drive, command: float, last: float, x: float, v: float
 ) -> tuple[float, float, float]:

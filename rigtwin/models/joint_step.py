@@ -13,11 +13,12 @@ from __future__ import annotations
 
 import math
 
-from controllers.compiled import compilable, inlined
+from controllers.compiled import compilable
 from rigtwin.components.dry_friction import dry_limits, slide
 from rigtwin.components.guide_force import damping, position_force, quick_damping
 from rigtwin.components.guide_step import GuideStep
 from rigtwin.components.servo import Play
+from rigtwin.numerics.compiling import part_kernel
 
 CORRECTIONS = 4
 """Number of times that a contact force is corrected. One suffices without dry friction: only what
@@ -28,7 +29,7 @@ CONTACT_DAMPING = 0.25
 """Damping ratio ζ of a compliant contact: gears and belts that hit a stop rebound little."""
 
 
-@inlined
+@part_kernel
 def step_joint(
     guide_step: GuideStep,
     mass: float,
@@ -84,19 +85,6 @@ def step_joint(
 
 
 @compilable
-def _carry(
-    guide_step: GuideStep,
-    mass: float,
-    state: tuple[float, float, float, float],
-    pushed: float,
-    outer: float,
-) -> tuple[float, float, float, float]:
-    """Advance a joint without a servo's damping; arguments as in `step_joint`."""
-    # A separate function: the compiler's SSA pass mishandles two inlined copies in one loop.
-    return step_joint(guide_step, mass, state, pushed, 0.0, outer)
-
-
-@compilable
 def _shrink(speed: float, most: float) -> float:
     """Return a speed reduced by dry friction by at most `most`, never beyond zero."""
     return math.copysign(max(abs(speed) - most, 0.0), speed)
@@ -142,7 +130,7 @@ def step_behind_play(
     freely = (turning * rotor[1] + h * pushed) / heavy
     rubbing = h * play.rotor_friction / heavy
     driven = pushed - held_by * rotor[1]
-    moved = _carry(guide_step, carried, state, driven, outer)
+    moved = step_joint(guide_step, carried, state, driven, 0.0, outer)
     speed, contact = _shrink(freely, rubbing), 0.0
     distance = rotor[0] + h * speed - moved[0]
     if abs(distance) > play.half:
@@ -158,6 +146,6 @@ def step_behind_play(
             excess = beyond + relaxed * (beyond - before) - soft * contact
             contact = max(contact + excess / (soft + (1.0 + relaxed) * yielding), 0.0)
             speed = _shrink(freely - h * side * contact / heavy, rubbing)
-            moved = _carry(guide_step, carried, state, driven, outer + side * contact)
+            moved = step_joint(guide_step, carried, state, driven, 0.0, outer + side * contact)
             distance = rotor[0] + h * speed - moved[0]
     return (rotor[0] + h * speed, speed), moved

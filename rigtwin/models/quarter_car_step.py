@@ -14,10 +14,11 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from controllers.compiled import compilable, inlined
+from controllers.compiled import compilable
 from rigtwin.components import RigPlant
 from rigtwin.components.dry_friction import breakaway
 from rigtwin.components.yielding import Rod, share_of_load, solve_yielding
+from rigtwin.numerics.compiling import part_kernel
 from rigtwin.simulation.plant_forces import stiffness_ratio
 from rigtwin.simulation.rig_contacts import RigContacts
 
@@ -144,7 +145,7 @@ def motor_friction(
     return min(max(unbalanced, -motor[1]), motor[0])
 
 
-@inlined
+@part_kernel
 def friction_limits(
     now: RigContacts, x: float, v: float, travel: float, sliding: float, load: float
 ) -> tuple[tuple[float, float], tuple[float, float]]:
@@ -160,7 +161,7 @@ def friction_limits(
     return rail_limits, breakaway(now.motor, now.motor_gap, travel, sliding, load)
 
 
-@inlined
+@part_kernel
 def press_tyre(
     now: RigContacts, deflection: float, ground_loss: float, share: float, h: float
 ) -> tuple[float, float]:
@@ -194,7 +195,7 @@ class CarriageForces(NamedTuple):
     loss: float  # Velocity at which the structure plate loses its yield, m/s.
 
 
-@inlined
+@part_kernel
 def solve_step(
     carriage: CarriageConstants, forces: CarriageForces, yields: bool
 ) -> tuple[float, float, float]:

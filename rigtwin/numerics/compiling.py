@@ -107,9 +107,22 @@ def loop_kernel(function: Function) -> Function:
     return _compile(function, counted=False)
 
 
-def _compile(function: Function, counted: bool) -> Function:
+def part_kernel(function: Function) -> Function:
+    """Compile a part of a `loop_kernel`, and copy its machine code into each caller.
+
+    A call in every step would pass all of its arguments in memory. Copied, the part costs as much
+    as if it were written in its caller, and its types are inferred once.
+    """
+    return _compile(function, counted=False, copied=True)
+
+
+def _compile(function: Function, counted: bool, copied: bool = False) -> Function:
     """Compile a function, with or without counting the references of arrays."""
-    options: dict[str, Any] = {"nogil": True, "error_model": "numpy", "_nrt": counted}
+    # Nothing calls a kernel through a C function pointer, and Python calls no part of a loop. Such
+    # wrappers take as long to compile as the function.
+    options = {"nogil": True, "error_model": "numpy", "_nrt": counted, "no_cfunc_wrapper": True}
+    if copied:
+        options |= {"forceinline": True, "no_cpython_wrapper": True}
     compiled: Any = numba.njit(**options)(function)
     if _CACHE is None:
         return cast(Function, compiled)
