@@ -1,4 +1,4 @@
-.PHONY: setup demo test test-slow check check-types check-style benchmark gallery docs system browser clean
+.PHONY: setup demo test test-slow check check-types check-style check-names benchmark gallery docs system browser clean
 .DEFAULT_GOAL := help
 
 PYTHON ?= python3
@@ -50,17 +50,19 @@ browser:
 	@bash scripts/browser.sh
 
 check: setup
-	@$(MAKE) --no-print-directory --jobs 2 --output-sync check-types check-style
+	@$(MAKE) --no-print-directory --jobs 2 --output-sync check-types check-style check-names
 
-check-types:
-	$(BIN)/pyright
+check-types: setup
+	nice $(BIN)/pyright
 
-check-style:
+check-style: setup
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/lint-imports --no-cache
 	$(BIN)/codespell README.md CONTRIBUTING.md CHANGELOG.md docs/*.md rigtwin controllers experiments referee machines
 	$(BIN)/numpydoc lint rigtwin/api/*.py
+
+check-names: setup
 	$(BIN)/python -m pytest -n0 tests/test_language.py tests/test_glossary.py
 
 benchmark: setup

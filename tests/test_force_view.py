@@ -84,8 +84,8 @@ ROD = """<mujoco><option gravity="0 0 -9.81"/><worldbody><body name="rod">
 INERTIA, GRAVITY = 0.004 + 0.6 * 0.2**2, 0.6 * 9.81 * 0.2
 
 
-def swing(limit: float) -> dict[str, Array]:
-    """Time, commanded torque and angle of a rod whose drive gives no more than `limit`."""
+def swing(limit: float, damping: float) -> dict[str, Array]:
+    """Time, commanded torque and angle of a damped rod whose drive gives no more than `limit`."""
     random = np.random.default_rng(8)
     time, angles = PERIOD * np.arange(ROWS), np.zeros(ROWS)
     torques = 0.5 * np.sin(2.1 * time) + 0.3 * np.sin(4.7 * time + 1.0)
@@ -93,7 +93,7 @@ def swing(limit: float) -> dict[str, Array]:
     for row in range(ROWS):
         angles[row], given = q, min(max(torques[row], -limit), limit)
         for _ in range(STEPS):
-            v += PERIOD / STEPS / INERTIA * (given - 0.05 * v - GRAVITY * math.sin(q))
+            v += PERIOD / STEPS / INERTIA * (given - damping * v - GRAVITY * math.sin(q))
             q += PERIOD / STEPS * v
     return {"t": time, "tau": torques, "q": angles + 1e-4 * random.standard_normal(ROWS)}
 
@@ -102,11 +102,12 @@ def swing(limit: float) -> dict[str, Array]:
 def test_a_torque_that_the_drive_did_not_give_is_judged_as_a_command(tmp_path: Path) -> None:
     model = tmp_path / "rod.xml"
     model.write_text(ROD)
-    log = write_log(tmp_path / "log.csv", swing(0.45))
+    log = write_log(tmp_path / "log.csv", swing(0.45, 0.07))
     assert rigtwin.describe(model, log).reading.kind.test == "inverse dynamics"
     answer = rigtwin.diagnose(log, machine=model)
     assert answer.verdict == "explained"
-    (finding,) = answer.effects
-    assert str(finding.name) == "saturation@drive"
-    assert finding.parameters["saturation"].value == pytest.approx(0.45, rel=0.03)
+    findings = {str(finding.name): finding.parameters for finding in answer.effects}
+    assert set(findings) == {"saturation@drive", "viscous@pivot"}
+    assert findings["saturation@drive"]["saturation"].value == pytest.approx(0.45, rel=0.03)
+    assert findings["viscous@pivot"]["viscous"].value == pytest.approx(0.07, rel=0.03)
     assert "taken as commands" in answer.answer.notes[0]
