@@ -51,6 +51,7 @@ def test_the_referees_rig_equals_the_nominal_twin_within_noise(tmp_path):
         assert 0.85 < float(residual @ residual) / evidence.expected < 1.1
 
 
+@pytest.mark.slow
 def test_the_referees_controller_follows_the_recorded_settings(tmp_path):
     law, demands = draw_demands("road10", np.random.default_rng(4))
     path = tmp_path / "road.mcap"

@@ -28,6 +28,9 @@ from tests.helpers.twin import answer, recorded
 SCHEMA = Path(rigtwin.diagnosis.__file__).parent / "answer.schema.json"
 VERDICTS = ("explained", "unknown", "no gap", "unusable")
 
+pytestmark = pytest.mark.slow
+"""Four diagnoses come first; the answers of other tests are written as reports too."""
+
 
 @pytest.fixture(scope="module")
 def outcomes() -> dict[str, Diagnosis]:
@@ -188,11 +191,8 @@ def test_names_from_files_cannot_write_the_page(outcomes):
 @pytest.mark.parametrize(
     ("verdict", "width"),
     [
-        pytest.param("explained", 1280, marks=pytest.mark.slow),
-        *(
-            pytest.param(verdict, 390, marks=() if verdict == "explained" else pytest.mark.slow)
-            for verdict in VERDICTS
-        ),
+        ("explained", 1280),
+        *((verdict, 390) for verdict in VERDICTS),
     ],
 )
 def test_a_browser_shows_it_without_errors_requests_or_sideways_scrolling(
