@@ -43,14 +43,6 @@ def folder_machine(folder: Path) -> rigtwin.Machine:
             "/sensor.load_cell",
             marks=pytest.mark.slow,
         ),
-        pytest.param(
-            "emps",
-            "positioning",
-            "coulomb@guide",
-            20.0,
-            "/sensor.position",
-            marks=pytest.mark.slow,
-        ),
         ("folder", "shake", "coulomb@guide", 6.0, "/sensor.position"),
     ],
 )

@@ -19,7 +19,7 @@ MODEL = """<mujoco model="balanced"><option timestep="0.001"/><worldbody>
 <body name="pole"><inertial pos="0 0 0.5" mass="0.1" diaginertia="0.0083 0.0083 0.0001"/>
 <joint name="hinge" type="hinge" axis="0 1 0" damping="1e-4"/></body></body></worldbody>
 <actuator><motor name="drive" joint="slider" gear="10"/></actuator></mujoco>"""
-TICK, SECONDS, NOISE = 10, 12.0, (2e-4, 1e-3)
+TICK, SECONDS, NOISE = 10, 8.0, (2e-4, 1e-3)
 
 
 def gains(model: mujoco.MjModel) -> np.ndarray:

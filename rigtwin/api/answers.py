@@ -11,6 +11,7 @@ from rigtwin.api.machines import described_machine, machine_of
 from rigtwin.api.recordings import Recording, resolve_recording
 from rigtwin.api.twin import Settings, names_of, require_unrecorded, twin_of
 from rigtwin.describing.force_view import REASONS, judge_otherwise, with_channels
+from rigtwin.description.implied import INVERSE
 from rigtwin.description.machine import Machine
 from rigtwin.diagnosis.change import Changes
 from rigtwin.diagnosis.changes import find_changes
@@ -142,7 +143,7 @@ def _look_otherwise(
     seen = _other_view(data)
     if seen is None:
         return diagnosis
-    view, reason = seen
+    view, kind = seen
     other = find_reasons(
         view.machine,
         view.recordings,
@@ -152,7 +153,11 @@ def _look_otherwise(
         progress=progress,
         thresholds=thresholds,
     )
-    return _with_note(other, diagnosis, reason) if _closed_share(other) >= MOST else diagnosis
+    # A motion drifts away from any prediction, and an effect that bounds it closes most of such a
+    # gap. So the forces count as commands only where these explain everything.
+    least = MOST if kind == INVERSE else 1.0
+    is_better = _closed_share(other) >= least
+    return _with_note(other, diagnosis, REASONS[kind]) if is_better else diagnosis
 
 
 def _closed_share(diagnosis: Diagnosis) -> float:
@@ -163,7 +168,7 @@ def _closed_share(diagnosis: Diagnosis) -> float:
 
 
 def _other_view(data: DiagnosisData) -> tuple[DiagnosisData, str] | None:
-    """Return logs in their other view, and what it is; None for recordings that have none."""
+    """Return logs in their other view, and its kind; None for recordings that have none."""
     first = data.recordings[0]
     origin = first.origin if isinstance(first, Recording) else None
     if origin is None or (view := judge_otherwise(origin)) is None:
@@ -172,7 +177,7 @@ def _other_view(data: DiagnosisData) -> tuple[DiagnosisData, str] | None:
         tuple(with_channels(origin, view, recording) for recording in recordings)
         for recordings in (data.recordings, data.held_out)
     )
-    return DiagnosisData(view.machine, fitted, judged), REASONS[view.reading.kind.test]
+    return DiagnosisData(view.machine, fitted, judged), view.reading.kind.test
 
 
 def _with_note(diagnosis: Diagnosis, before: Diagnosis, reason: str) -> Diagnosis:

@@ -46,6 +46,7 @@ from rigtwin.diagnosis.starts import (
     GATEWAY,
     REGULAR,
     Start,
+    are_late_twins,
     start_elsewhere,
     start_in_series,
     start_otherwise,
@@ -391,9 +392,10 @@ class HypothesisSearch:
         # The closest fit is a leader even if its effects are not worth their price yet: the next
         # effect may make them so.
         closest = sorted(near, key=lambda fit: fit.misfit)
-        # The order is that in which they are tried: the best, the closest, further ones, and one
-        # with dry friction.
-        leaders = (ranked[0], *closest[:1], *near[: self.thresholds.leaders], *dry[:1])
+        twins = [fit for fit in near if are_late_twins(fit.effects, ranked[0].effects)]
+        # The order is that in which they are tried: the best, the same with a delay for a lag, the
+        # closest, further ones, and one with dry friction.
+        leaders = (ranked[0], *twins, *closest[:1], *near[: self.thresholds.leaders], *dry[:1])
         for fit in leaders:
             if frozenset(fit.effects) not in self._extended:
                 return fit

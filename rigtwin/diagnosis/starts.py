@@ -143,6 +143,21 @@ def _start_pair(
     return both, min(starts, key=lambda start: _misfit(fitter, both, start))
 
 
+def are_late_twins(one: Sequence[Effect], other: Sequence[Effect]) -> bool:
+    """Return whether two hypotheses differ only by a delay in the place of a lag.
+
+    Both resemble each other so closely that only further effects show which of them is present.
+
+    Parameters
+    ----------
+    one, other
+        Effects of the hypotheses.
+    """
+    differences = set(one) ^ set(other)
+    late = {effect.kind.name for effect in differences} == {*LATE_BY_TIME}
+    return late and len(differences) == 2 and len({effect.group for effect in differences}) == 1
+
+
 def start_regular_instead(fitter: Fitter, leader: Fit, candidates: Sequence[Effect]) -> list[Start]:
     """Start each regular effect in the place of a rare effect of the same component.
 
