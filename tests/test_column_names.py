@@ -120,3 +120,22 @@ def test_a_current_of_another_constant_is_asked_about(tmp_path: Path) -> None:
     current = 3.0 * INERTIA * ACCELERATION / TORQUE_CONSTANT
     with pytest.raises(RigtwinError, match="is it that force"):
         sources(tmp_path, SHAFT, {"shaft_pos": SWING, "current (A)": current})
+
+
+def test_the_current_of_a_motor_is_its_control_in_a_test_of_force_commands(tmp_path: Path) -> None:
+    (tmp_path / "model.xml").write_text(SHAFT)
+    current = INERTIA * ACCELERATION / TORQUE_CONSTANT
+    columns = {"time": TIME, "shaft_pos": SWING, "current (A)": current}
+    log = write_log(tmp_path / "log.csv", columns)
+    answer = rigtwin.describe(tmp_path / "model.xml", log, test="force commands")
+    assert answer.record()["/command.drive"] == pytest.approx(current, abs=1e-6)
+
+
+def test_the_gain_of_a_servo_is_no_gear(tmp_path: Path) -> None:
+    servo = SHAFT.replace(
+        '<motor name="drive" joint="shaft" gear="0.5"/>',
+        '<position joint="shaft" kp="50" name="drive"/>',
+    )
+    columns = {"shaft_pos": SWING, "shaft_torque": INERTIA * ACCELERATION / 50.0}
+    with pytest.raises(RigtwinError, match="before a gear"):
+        sources(tmp_path, servo, columns)

@@ -111,3 +111,11 @@ def test_a_torque_that_the_drive_did_not_give_is_judged_as_a_command(tmp_path: P
     assert findings["saturation@drive"]["saturation"].value == pytest.approx(0.45, rel=0.03)
     assert findings["viscous@pivot"]["viscous"].value == pytest.approx(0.07, rel=0.03)
     assert "taken as commands" in answer.answer.notes[0]
+
+
+def test_forces_of_joints_without_actuators_are_no_commands(tmp_path: Path) -> None:
+    model = tmp_path / "rod.xml"
+    model.write_text(ROD.replace('<motor name="drive" joint="pivot"/>', ""))
+    described = rigtwin.describe(model, write_log(tmp_path / "log.csv", swing(0.45, 0.07)))
+    assert described.reading.kind.test == "inverse dynamics"
+    assert judge_otherwise(described) is None

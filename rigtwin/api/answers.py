@@ -156,7 +156,7 @@ def _look_otherwise(
     # A motion drifts away from any prediction, and an effect that bounds it closes most of such a
     # gap. So the forces count as commands only where these explain everything.
     least = MOST if kind == INVERSE else 1.0
-    is_better = _closed_share(other) >= least
+    is_better = other.verdict != "unusable" and _closed_share(other) >= least
     return _with_note(other, diagnosis, REASONS[kind]) if is_better else diagnosis
 
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 
 from rigtwin.describing.checks import follows
-from rigtwin.describing.force_signals import force_signal
 from rigtwin.describing.log import STATED, Log
+from rigtwin.describing.match import MOTOR_CURRENT
 from rigtwin.describing.quantity import SI, JointQuantity
 from rigtwin.describing.question import Question, option
 from rigtwin.describing.replay_kind import command_quantities, takes_force
@@ -50,7 +50,7 @@ def position_command(log: Log, joint: str, position: Array) -> LogSignal | None:
 
 
 def force_command(
-    log: Log, joint: str, measured: Collection[str], position: Array
+    log: Log, joint: str, measured: Mapping[str, LogSignal], position: Array
 ) -> LogSignal | None:
     """Return the command of an actuator that pushes, as the actuator takes it.
 
@@ -61,7 +61,7 @@ def force_command(
     joint
         Joint that the actuator pushes.
     measured
-        Joints whose measured force can take the place of a command.
+        Joint → measured force, which can take the place of a command.
     position
         Position of the joint, SI, shape (rows,).
     """
@@ -71,9 +71,9 @@ def force_command(
                 return _following_command(log, joint, quantity, _velocity(position, log.time()))
             return _control(log, joint, quantity)
     # Without any command, the measured force itself is what pushes the model's joint.
-    pushes = takes_force(log.mechanism, joint)
-    if pushes and joint in measured and (signal := force_signal(log, joint)) is not None:
-        return replace(_as_control(log, signal), quantity=JointQuantity.FORCE_COMMAND)
+    if takes_force(log.mechanism, joint) and joint in measured:
+        control = _as_control(log, measured[joint])
+        return replace(control, quantity=JointQuantity.FORCE_COMMAND)
     log.questions.append(
         f"no column is the command of joint {joint}; say "
         f"{option(f'{joint}.command', 'COLUMN')} or {option(f'{joint}.command', '0')}"
@@ -213,6 +213,9 @@ def _control(log: Log, joint: str, quantity: JointQuantity) -> LogSignal | None:
 def _as_control(log: Log, signal: LogSignal) -> LogSignal:
     """A force as the control that makes the actuator give it."""
     constant = actuator_constant(log.mechanism, actuator_on(log.mechanism, signal.joint) or "")
+    if signal.why == MOTOR_CURRENT:
+        # A motor's current is its control.
+        return replace(signal, scale=1.0, assumed=("in the unit of the actuator's control",))
     # The log holds a force, but the recording's channel is the control: force = gear · gain ·
     # control.
     is_control = constant in (0.0, 1.0) or signal.unit == "1" or signal.formula

@@ -39,8 +39,8 @@ SUGGESTED = 3
 
 def force_signals(
     log: Log, positions: Mapping[str, Array]
-) -> tuple[dict[str, LogSignal], tuple[str, ...]]:
-    """Return the measured forces that have a sign, and the joints whose force is zero throughout.
+) -> tuple[dict[str, LogSignal], dict[str, LogSignal]]:
+    """Return the measured forces that have a sign, and those that are zero throughout, by joint.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ def force_signals(
         Joint → position, SI, shape (rows,).
     """
     forces: dict[str, LogSignal] = {}
-    still: list[str] = []
+    still: dict[str, LogSignal] = {}
     for joint in positions:
         if log.slots.has(joint, JointQuantity.FORCE):
             signal = force_signal(log, joint)
@@ -61,7 +61,7 @@ def force_signals(
         if np.any(log.values(signal)):
             forces[joint] = signal
         else:
-            still.append(joint)
+            still[joint] = signal
     # One logger writes all forces in one way, so they are judged together.
     if _are_magnitudes(log, forces, positions):
         names = [signal.column for signal in forces.values()]
@@ -71,7 +71,7 @@ def force_signals(
             "they are magnitudes"
         )
         forces = {}
-    return forces, tuple(still)
+    return forces, still
 
 
 def force_signal(log: Log, joint: str) -> LogSignal | None:
@@ -116,6 +116,8 @@ def _motor_current(log: Log, joint: str, positions: Mapping[str, Array]) -> LogS
     actuator = actuator_on(log.mechanism, joint)
     columns = log.slots.columns(joint, JointQuantity.CURRENT)
     if actuator is None or log.mechanism.positions(actuator) or len(columns) != 1:
+        return None
+    if not takes_force(log.mechanism, joint):
         return None
     constant = actuator_constant(log.mechanism, actuator)
     slope = _slope(log, joint, positions, log.columns.values[columns[0]])
@@ -276,14 +278,21 @@ def _factor(log: Log, joint: str, ratio: float) -> float:
 
     It is the gear of the model's actuator where that is near the inverse of `ratio`.
     """
-    gear = _gear(log, joint)
-    return gear if gear > 1.0 and 1.0 / NEAR_GEAR < gear * ratio < NEAR_GEAR else 1.0 / ratio
+    return _fitting_gear(log, joint, ratio) or 1.0 / ratio
 
 
-def _gear(log: Log, joint: str) -> float:
-    """Force of the joint's actuator for each unit of its control, 1 without an actuator."""
+def _fitting_gear(log: Log, joint: str, ratio: float) -> float | None:
+    """Gear of the model's actuator where it is near the inverse of `ratio`; None otherwise."""
     actuator = actuator_on(log.mechanism, joint)
-    return actuator_constant(log.mechanism, actuator) if actuator is not None else 1.0
+    # The constant of a position actuator is its gain, and no gear.
+    if (
+        actuator is None
+        or log.mechanism.positions(actuator)
+        or not takes_force(log.mechanism, joint)
+    ):
+        return None
+    gear = actuator_constant(log.mechanism, actuator)
+    return gear if gear > 1.0 and 1.0 / NEAR_GEAR < gear * ratio < NEAR_GEAR else None
 
 
 def _check_force(log: Log, signal: LogSignal, slope: Slope) -> LogSignal:
@@ -311,17 +320,17 @@ def _check_force(log: Log, signal: LogSignal, slope: Slope) -> LogSignal:
     is_clear = SLOPE_LOW < abs(ratio) < SLOPE_HIGH
     has_unit = signal.quantity is JointQuantity.FORCE and not signal.assumed
     is_possible = is_clear or (has_unit and SLOPE_LOW < abs(ratio) < SLOPE_HIGHEST)
-    gear = _factor(log, signal.joint, abs(ratio))
-    is_before_gear = signal.quantity is JointQuantity.FORCE and gear == _gear(log, signal.joint)
-    if not stated and not is_possible and is_before_gear:
+    gear = _fitting_gear(log, signal.joint, abs(ratio))
+    is_doubtful = not stated and not is_possible
+    if is_doubtful and gear is not None and signal.quantity is JointQuantity.FORCE:
         text = f"before the gear of the model's actuator: times {gear:g}"
         signal = replace(signal, scale=gear, assumed=(*signal.assumed, text))
         ratio, is_clear = ratio * gear, True
-    elif not stated and not is_possible:
+    elif is_doubtful:
         question = ask(
             f"column {signal.column!r} is {abs(ratio):.3g} times the force that the model needs at "
             f"{signal.joint}; is it in another unit, or before a gear?",
-            option(signal.key, f"{gear:.4g} * {signal.column}"),
+            option(signal.key, f"{_factor(log, signal.joint, ratio):.4g} * {signal.column}"),
             option(signal.key, f"{signal.column} [{signal.unit}]") + " if it is right",
         )
         log.questions.append(str(question))

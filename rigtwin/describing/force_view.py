@@ -69,9 +69,10 @@ def _may_be_commands(described: Described) -> bool:
     Coupled joints that measured forces push drift away within seconds, and show nothing.
     """
     mechanism = Mechanism(described.machine.model)
-    forces = _forces(described).values()
+    joints, forces = list(described.reading.joints), _forces(described).values()
     are_assumed = all(signal.why != STATED for signal in forces)
-    return are_assumed and not are_coupled(mechanism, list(described.reading.joints))
+    are_driven = all(actuator_on(mechanism, joint) is not None for joint in joints)
+    return are_assumed and are_driven and not are_coupled(mechanism, joints)
 
 
 def with_channels(described: Described, other: Described, recording: RecordedTest) -> RecordedTest:

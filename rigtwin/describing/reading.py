@@ -178,7 +178,9 @@ def _choose_movers(
     forces, still = force_signals(log, positions)
     try:
         placed = all(signal.quantity is JointQuantity.POSITION for signal in signals)
-        kind = choose_kind(log.mechanism, log.slots, joints, list(forces), still, placed, test)
+        kind = choose_kind(
+            log.mechanism, log.slots, joints, list(forces), list(still), placed, test
+        )
     except Question as question:
         before = len(log.questions)
         # A suggestion by the data is worth more than the general question, which follows where
@@ -228,7 +230,7 @@ def _movers(
     test: str,
     positions: Mapping[str, Array],
     forces: Mapping[str, LogSignal],
-    still: Sequence[str],
+    still: Mapping[str, LogSignal],
 ) -> dict[str, LogSignal]:
     """Forces or commands that the test needs, by joint."""
     movers: dict[str, LogSignal] = {}
@@ -245,7 +247,7 @@ def _movers(
             mover = no_force(joint)
         elif actuator_on(log.mechanism, joint) is not None:
             mover = (
-                force_command(log, joint, {*forces, *still}, position)
+                force_command(log, joint, {**forces, **still}, position)
                 if test == FORCES
                 else position_command(log, joint, position)
             )
