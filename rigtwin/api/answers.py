@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from rigtwin.api.describing import record_again
 from rigtwin.api.diagnosis_data import DiagnosisData, Recorded, as_list, has_duplicate, read_data
 from rigtwin.api.machines import described_machine, machine_of
 from rigtwin.api.recordings import Recording, resolve_recording
 from rigtwin.api.twin import Settings, names_of, require_unrecorded, twin_of
-from rigtwin.describing.force_view import REASONS, judge_otherwise, with_channels
-from rigtwin.description.implied import INVERSE
+from rigtwin.describing.other_view import VIEWS, OtherView, describe_otherwise
 from rigtwin.description.machine import Machine
 from rigtwin.diagnosis.change import Changes
 from rigtwin.diagnosis.changes import find_changes
@@ -24,9 +24,6 @@ from rigtwin.errors import RigtwinError
 from rigtwin.simulation.experiment import find_experiment
 from rigtwin.studies.friction_spikes import Calibration
 
-MOST = 0.5
-"""Share of the gap below which an answer is poor, and which the answer of the other view must close
-to take its place."""
 LEAST_DETECTED, MOST_FALSE = 0.8, 0.1
 """Least share of reversals that a friction compensator detects, and most false steps per reversal,
 on the recording it was identified from."""
@@ -124,8 +121,8 @@ def diagnose(
         thresholds=thresholds,
         first_look=first_look,
     )
-    # Settings and exclusions name components, which the other view does not have.
-    if settings or without or exclude or _closed_share(diagnosis) >= MOST:
+    # Settings and exclusions name components, which another view does not have.
+    if settings or without or exclude:
         return diagnosis
     return _look_otherwise(diagnosis, data, thresholds, progress)
 
@@ -136,28 +133,26 @@ def _look_otherwise(
     thresholds: Thresholds,
     progress: Callable[[str, int], object],
 ) -> Diagnosis:
-    """Return the answer of the other view, see `force_view`, where it closes most of its gap.
+    """Return the answer of another view of the logs that explains enough, see `other_view`.
 
-    `diagnosis`, the answer of the first view, is returned otherwise.
+    `diagnosis`, the answer of the first view, is returned where there is none.
     """
-    seen = _other_view(data)
-    if seen is None:
-        return diagnosis
-    view, kind = seen
-    other = find_reasons(
-        view.machine,
-        view.recordings,
-        None,
-        view.held_out,
-        (),
-        progress=progress,
-        thresholds=thresholds,
-    )
-    # A motion drifts away from any prediction, and an effect that bounds it closes most of such a
-    # gap. So the forces count as commands only where these explain everything.
-    least = MOST if kind == INVERSE else 1.0
-    is_better = other.verdict != "unusable" and _closed_share(other) >= least
-    return _with_note(other, diagnosis, REASONS[kind]) if is_better else diagnosis
+    closed = _closed_share(diagnosis)
+    for view, seen in _other_views(data, closed):
+        other = find_reasons(
+            seen.machine,
+            seen.recordings,
+            None,
+            seen.held_out,
+            (),
+            progress=progress,
+            thresholds=thresholds,
+        )
+        if other.verdict == "no gap" and _names_force_sensor(diagnosis, data.machine):
+            continue
+        if other.verdict != "unusable" and _closed_share(other) >= view.least:
+            return _with_note(other, diagnosis, view.reason)
+    return diagnosis
 
 
 def _closed_share(diagnosis: Diagnosis) -> float:
@@ -167,17 +162,25 @@ def _closed_share(diagnosis: Diagnosis) -> float:
     return diagnosis.gap.shrinkage_held_out.value if diagnosis.effects else 0.0
 
 
-def _other_view(data: DiagnosisData) -> tuple[DiagnosisData, str] | None:
-    """Return logs in their other view, and its kind; None for recordings that have none."""
-    first = data.recordings[0]
-    origin = first.origin if isinstance(first, Recording) else None
-    if origin is None or (view := judge_otherwise(origin)) is None:
-        return None
-    fitted, judged = (
-        tuple(with_channels(origin, view, recording) for recording in recordings)
-        for recordings in (data.recordings, data.held_out)
-    )
-    return DiagnosisData(view.machine, fitted, judged), view.reading.kind.test
+def _names_force_sensor(diagnosis: Diagnosis, machine: Machine) -> bool:
+    """Return whether an answer names an effect of a force sensor, which only forces can show."""
+    sensors = {name for name, part in machine.components.items() if part.quantity == "force"}
+    return any(finding.name.component in sensors for finding in diagnosis.effects)
+
+
+def _other_views(data: DiagnosisData, closed: float) -> Iterator[tuple[OtherView, DiagnosisData]]:
+    """Yield the views in which logs are worth judging where an answer closes a share of the gap."""
+    recordings = (*data.recordings, *data.held_out)
+    origins = [recording.origin for recording in recordings if isinstance(recording, Recording)]
+    logs = [origin for origin in origins if origin is not None]
+    if len(logs) < len(recordings):
+        return
+    described = logs[0].described
+    for view in VIEWS.get(described.reading.kind.test, ()):
+        if closed >= view.below or (seen := describe_otherwise(described, view)) is None:
+            continue
+        again, count = tuple(record_again(seen, logs)), len(data.recordings)
+        yield view, DiagnosisData(seen.machine, again[:count], again[count:])
 
 
 def _with_note(diagnosis: Diagnosis, before: Diagnosis, reason: str) -> Diagnosis:

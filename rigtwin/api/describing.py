@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from rigtwin.api.recordings import Recording, with_machine
+from rigtwin.api.recordings import Origin, Recording, with_machine
 from rigtwin.describing.described import Described, describe_log
 from rigtwin.description.bare import MODELS
 from rigtwin.description.menagerie import find_robot, is_robot
@@ -156,5 +156,31 @@ def record_logs(described: Described, logs: Sequence[Log | reader.RecordedTest])
     logs
         Logs with the same columns.
     """
-    tests = [test for log in logs for test in described.records(log_files(log))]
-    return [replace(with_machine(test, described.machine), origin=described) for test in tests]
+    return [test for log in logs for test in _record_log(described, log_files(log))]
+
+
+def _record_log(described: Described, log: tuple[Path, ...]) -> list[Recording]:
+    """Return all tests of one log as recordings."""
+    return [
+        replace(with_machine(test, described.machine), origin=Origin(described, log, number))
+        for number, test in enumerate(described.records(log))
+    ]
+
+
+def record_again(described: Described, origins: Sequence[Origin]) -> list[Recording]:
+    """Return the same tests of logs as recordings of a machine that is described otherwise.
+
+    Parameters
+    ----------
+    described
+        Machine with the map of its log.
+    origins
+        Logs of the tests.
+
+    Raises
+    ------
+    RigtwinError
+        If a log lacks a column.
+    """
+    tests = {log: _record_log(described, log) for log in {origin.log: None for origin in origins}}
+    return [tests[origin.log][origin.test] for origin in origins]

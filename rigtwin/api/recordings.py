@@ -22,6 +22,25 @@ from rigtwin.recording import export, reader
 
 
 @dataclass(frozen=True)
+class Origin:
+    """Log that a recording was made from.
+
+    Attributes
+    ----------
+    described
+        Description by which the log was read.
+    log
+        Files of the log, whose columns are joined.
+    test
+        Number of the test among those of the log, from 0 on.
+    """
+
+    described: Described
+    log: tuple[Path, ...]
+    test: int
+
+
+@dataclass(frozen=True)
 class Recording(reader.RecordedTest):
     """One recorded test.
 
@@ -31,8 +50,8 @@ class Recording(reader.RecordedTest):
 
     described: Machine | None = field(default=None, repr=False)
     """Machine of the recording, if it was stated when the recording was loaded or made."""
-    origin: Described | None = field(default=None, repr=False)
-    """Description of the log that the recording was made from; None of a recorded test."""
+    origin: Origin | None = field(default=None, repr=False)
+    """Log that the recording was made from; None of a recorded test."""
     report: tuple[str, ...] = field(default=(), repr=False)
     """Lines about the imported data: gaps, units, columns used. Empty unless it was imported."""
 

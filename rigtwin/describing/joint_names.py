@@ -6,7 +6,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from rigtwin.describing.heading import split_words
-from rigtwin.describing.quantity import COMMANDED, COORDINATES, MEASURED, WORDS, JointQuantity
+from rigtwin.describing.quantity import (
+    COMMANDED,
+    COORDINATES,
+    MEASURED,
+    TIME,
+    UNIT_WORDS,
+    WORDS,
+    JointQuantity,
+)
 from rigtwin.description.joint_elements import body_of, movable_joints
 from rigtwin.description.mechanism import Mechanism
 
@@ -87,6 +95,32 @@ def list_aliases(mechanism: Mechanism) -> list[Alias]:
         alias = Alias(joint, (word,), None, f"{word} of {joint}", is_part=True)
         aliases.setdefault((joint, (word,)), alias)
     return list(aliases.values())
+
+
+def spell_out(words: tuple[str, ...], aliases: Sequence[Alias]) -> tuple[str, ...]:
+    """Return the words of a heading with abbreviated words of joints' names in full.
+
+    An abbreviation is the beginning of one word of the names alone, as "susp" is of suspension.
+
+    Parameters
+    ----------
+    words
+        Words of the heading.
+    aliases
+        Names of the joints.
+    """
+    names = {word for alias in aliases for word in alias.words}
+    known = (
+        names | QUANTITY_WORDS | MEASURED | COMMANDED | COORDINATES | TIME | frozenset(UNIT_WORDS)
+    )
+
+    def full(word: str) -> str:
+        if len(word) < SHORTEST_WORD or word.isdigit() or word in known:
+            return word
+        longer = [name for name in names if name.startswith(word)]
+        return longer[0] if len(longer) == 1 else word
+
+    return tuple(full(word) for word in words)
 
 
 def _distinctive_words(joints: Sequence[str], aliases: Sequence[Alias]) -> list[tuple[str, str]]:

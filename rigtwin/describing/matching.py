@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from rigtwin.describing.heading import read_words, split_words, stated_unit
-from rigtwin.describing.joint_names import QUANTITY_WORDS, Alias, list_aliases
+from rigtwin.describing.joint_names import QUANTITY_WORDS, Alias, list_aliases, spell_out
 from rigtwin.describing.match import NUMBERED, REMAINING, UNNAMED, Match
 from rigtwin.describing.quantity import ANGULAR, COORDINATES, MEASURED, JointQuantity
 from rigtwin.describing.question import enumerate_names
@@ -47,7 +47,7 @@ def match_columns(
     for column in _distinct(columns):
         if column in skipped:
             continue
-        words, unit = split_words(column), columns.units.get(column, "")
+        words, unit = spell_out(split_words(column), aliases), columns.units.get(column, "")
         named = _by_alias(column, words, unit, aliases)
         if len(named) == 1:
             matches += named

@@ -33,15 +33,16 @@ def _words(text: str) -> frozenset[str]:
 WORDS: dict[JointQuantity, frozenset[str]] = {
     JointQuantity.POSITION: _words(
         "pos position positions angle angles ang q qpos theta phi encoder enc disp displacement "
-        "travel coordinate jointpos rotation location place qm"
+        "travel coordinate jointpos rotation location place qm winkel weg"
     ),
     JointQuantity.VELOCITY: _words(
-        "vel velocity velocities speed dq qd qvel qdot omega rate dtheta thetadot dphi rpm jointvel"
+        "vel velocity velocities speed dq qd qvel qdot omega rate dtheta thetadot dphi rpm "
+        "jointvel geschwindigkeit drehzahl vitesse"
     ),
     JointQuantity.FORCE: _words(
-        "tau torque torques force forces effort efforts trq tq frc moment loadcell"
+        "tau torque torques force forces effort efforts trq tq frc moment loadcell kraft drehmoment"
     ),
-    JointQuantity.CURRENT: _words("current currents cur curr amps amperage"),
+    JointQuantity.CURRENT: _words("current currents cur curr amps amperage strom courant"),
     JointQuantity.VOLTAGE: _words("voltage volt volts"),
     JointQuantity.OTHER: _words(
         "acc accel acceleration ddq qdd qacc temp temperature error err status mode flag index "
@@ -51,12 +52,14 @@ WORDS: dict[JointQuantity, frozenset[str]] = {
 """Quantity → words that name it."""
 COMMANDED = _words(
     "cmd command commands commanded target targets goal goals desired des ref reference setpoint "
-    "set qref qdes qcmd action actions demand demanded ctrl control u sp input"
+    "set qref qdes qcmd action actions demand demanded ctrl control u sp input "
+    "soll sollwert consigne"
 )
 """Words that say that a column was commanded and not measured."""
 MEASURED = _words(
     "measured meas actual act present read reading feedback fb observation obs state real data "
-    "raw value states joint joints motor actuator servo axis link j m sensor of the"
+    "raw value states joint joints motor actuator servo axis link j m sensor of the "
+    "controller ist istwert"
 )
 """Words that say nothing more."""
 UNIT_WORDS = {
@@ -91,7 +94,9 @@ TESTS = _words("episode ep run trial rollout traj trajectory repetition rep expe
 """Words that name the number of a test."""
 COUNTING = _words("index idx id number nr no num")
 """Words that may stand beside them."""
-TIME = _words("t time timespan timestamp timestamps stamp clock elapsed seconds secs sec")
+TIME = _words(
+    "t time timespan timestamp timestamps stamp clock elapsed seconds secs sec zeit temps"
+)
 """Words that name the time."""
 TIME_UNITS = {
     "s": "s",

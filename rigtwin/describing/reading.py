@@ -32,6 +32,7 @@ from rigtwin.describing.question import Question, enumerate_names, option
 from rigtwin.describing.replay_kind import ReplayKind, choose_kind, free_swing
 from rigtwin.describing.resting import note_resting
 from rigtwin.describing.schedule_signals import ScheduleColumn, schedule_columns
+from rigtwin.describing.servo_forces import come_from_servos
 from rigtwin.describing.signal import LogSignal
 from rigtwin.describing.slots import Slots
 from rigtwin.describing.velocity_signals import integrate, joints_by_velocity, velocity_signals
@@ -176,10 +177,11 @@ def _choose_movers(
     joints = list(positions)
     offer_remaining_command(log, positions)
     forces, still = force_signals(log, positions)
+    by_servos = len(forces) == len(joints) and come_from_servos(log, positions, forces)
     try:
         placed = all(signal.quantity is JointQuantity.POSITION for signal in signals)
         kind = choose_kind(
-            log.mechanism, log.slots, joints, list(forces), list(still), placed, test
+            log.mechanism, log.slots, joints, list(forces), list(still), placed, test, by_servos
         )
     except Question as question:
         before = len(log.questions)

@@ -49,6 +49,7 @@ def choose_kind(
     still: Sequence[str],
     placed: bool,
     stated: str = "",
+    by_servos: bool = False,
 ) -> ReplayKind:
     """Choose the kind of test.
 
@@ -68,6 +69,8 @@ def choose_kind(
         Whether the log holds positions, and not velocities alone.
     stated
         Kind of test that the owner of the log states; empty without one.
+    by_servos
+        Whether the measured forces are those that the model's servos give.
 
     Raises
     ------
@@ -81,6 +84,8 @@ def choose_kind(
         return ReplayKind(wanted, "as stated")
     positions = [j for j in joints if _takes_position(mechanism, j)]
     commanded = slots.joints(JointQuantity.COMMAND, joints)
+    if by_servos and placed:
+        return ReplayKind(SERVOS, "the measured forces are those of the model's servos")
     # Measured forces come first: they need no model of the actuators.
     if len(measured) == len(joints) and placed:
         beside = " (position commands are there too: --test servos)" if commanded else ""
@@ -181,6 +186,20 @@ def _takes_position(mechanism: Mechanism, joint: str) -> bool:
     return actuator is not None and mechanism.positions(actuator)
 
 
+def are_servos(mechanism: Mechanism, joints: Sequence[str]) -> bool:
+    """Return whether the model has a servo with damping at every joint.
+
+    Parameters
+    ----------
+    mechanism
+        The compiled MJCF or URDF.
+    joints
+        Joints that take part.
+    """
+    placed = all(_takes_position(mechanism, joint) for joint in joints)
+    return placed and _position_test(mechanism, joints).test == SERVOS
+
+
 def _position_test(mechanism: Mechanism, joints: Sequence[str]) -> ReplayKind:
     """Servos where the model says how they are damped; else actuators without a model inside."""
     for joint in joints:
@@ -199,6 +218,14 @@ def _position_test(mechanism: Mechanism, joints: Sequence[str]) -> ReplayKind:
 def _question(
     mechanism: Mechanism, joints: Sequence[str], measured: Sequence[str], commanded: Sequence[str]
 ) -> RigtwinError:
+    pulling = [
+        a for a in mechanism.names("actuator") if mechanism.tendon_of("actuator", a) is not None
+    ]
+    if pulling and not measured:
+        return RigtwinError(
+            f"actuator {pulling[0]} pulls a tendon; such a machine needs a written description, "
+            "docs/machines.md, joints that are free"
+        )
     if not measured and not commanded:
         joint = joints[0]
         answers = [option(f"{joint}.force", "COLUMN"), option(f"{joint}.command", "COLUMN")]
@@ -210,14 +237,6 @@ def _question(
             "no column is a measured force or a command, so nothing says what moves "
             f"{enumerate_names(list(joints))}",
             *answers,
-        )
-    pulling = [
-        a for a in mechanism.names("actuator") if mechanism.tendon_of("actuator", a) is not None
-    ]
-    if pulling and not measured:
-        return RigtwinError(
-            f"actuator {pulling[0]} pulls a tendon; such a machine needs a written description, "
-            "docs/machines.md, joints that are free"
         )
     if commanded and not measured:
         missing = [j for j in commanded if actuator_on(mechanism, j) is None]

@@ -11,6 +11,7 @@ from rigtwin.description.coupling import are_coupled
 from rigtwin.description.implied_parts import (
     FREE_SERVO,
     Implied,
+    add_base,
     add_free_joints,
     add_links,
     add_mass,
@@ -127,7 +128,9 @@ def _expand_replay(
             mistakes.note(where, f"{key} follows from test = {test!r}; leave one of them out")
             return
     missing = [j for j in joints if actuator_on(mechanism, j) is None]
-    if test in (POSITIONS, SERVOS) and missing:
+    # What a servo shakes may carry joints of its own, such as a seat on its spring.
+    carried = test == SERVOS and len(missing) < len(joints) and are_coupled(mechanism, joints)
+    if test in (POSITIONS, SERVOS) and missing and not carried:
         mistakes.note(where, f"test = {test!r}: joint {missing[0]} has no position actuator")
         return
     velocities = table.get("velocities", [])
@@ -164,6 +167,8 @@ def _add_group(
     place of their position.
     """
     tables = implied.components
+    if test != POSITIONS and len(joints) > 1:
+        add_base(mechanism, tables)
     sensors: list[str] = []
     for joint in joints:
         measured = "velocity" if joint in velocities else "position"

@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
 from rigtwin.description.joint_elements import (
     body_of,
     identifier,
@@ -24,6 +26,8 @@ FREE = [
     "end_stops",
 ]
 """Effects at coupled joints that are free to move."""
+UP = 0.5
+"""Share of the largest component of gravity from which an axis counts as vertical."""
 FREE_SERVO = [
     "gains",
     "position_gain",
@@ -71,6 +75,20 @@ def sensor_table(mechanism: Mechanism, joint: str, measured: str) -> dict[str, A
     """Return the table of a sensor: one of the MJCF, or one without an element of its own."""
     known = sensor_on(mechanism, joint, measured)
     return {"sensor": known} if known else {"joint": joint, "type": f"{measured} sensor"}
+
+
+def add_base(mechanism: Mechanism, tables: dict[str, dict[str, Any]]) -> None:
+    """Add the base of coupled joints under gravity, which may be off level."""
+    gravity = np.abs(mechanism.model.opt.gravity)
+    if not gravity.any():
+        return
+    # A turn about the direction of gravity has no effect.
+    level = [axis for axis, share in zip("xyz", gravity / gravity.max(), strict=True) if share < UP]
+    tables["base_level" if "base" in tables else "base"] = {
+        "body": "world",
+        "type": "base",
+        "effects": [f"tilt_{axis}" for axis in level],
+    }
 
 
 def add_tendons(

@@ -17,9 +17,9 @@ from rigtwin.errors import RigtwinError
 
 TICKS_LATE = 0.5
 """Default tolerance of the sampling time of a signal, ticks."""
-HELD = 2.5e-3
+HELD = 5e-3
 """Largest sampling delay of a force against a measured motion, s: half a tick of a controller of
-200 Hz. A log of fewer rows may come from a faster controller."""
+100 Hz. A log of fewer rows may come from a faster controller."""
 NO_JOINT = Joint("", False, 0.0, (-1.0, 1.0), (0.0, 0.0), 0.0)
 """Joint of a replay that covers a whole machine."""
 
