@@ -25,6 +25,7 @@ LEG = """<mujoco><compiler angle="radian" autolimits="true"/><option gravity="0 
 SHAFT = """<mujoco><option gravity="0 0 0"/><worldbody><body name="rotor">
 <joint name="shaft" axis="0 0 1"/><inertial pos="0 0 0" mass="1" diaginertia="0.02 0.02 0.02"/>
 </body></worldbody><actuator><motor name="drive" joint="shaft" gear="0.5"/></actuator></mujoco>"""
+MOTOR = '<motor name="drive" joint="shaft" gear="0.5"/>'
 PERIOD, ROWS, INERTIA, TORQUE_CONSTANT = 5e-3, 2000, 0.02, 0.5
 TIME = PERIOD * np.arange(ROWS)
 SWING = 0.4 * np.sin(2.0 * TIME) + 0.1 * np.sin(9.0 * TIME)
@@ -132,10 +133,41 @@ def test_the_current_of_a_motor_is_its_control_in_a_test_of_force_commands(tmp_p
 
 
 def test_the_gain_of_a_servo_is_no_gear(tmp_path: Path) -> None:
-    servo = SHAFT.replace(
-        '<motor name="drive" joint="shaft" gear="0.5"/>',
-        '<position joint="shaft" kp="50" name="drive"/>',
-    )
+    servo = SHAFT.replace(MOTOR, '<position joint="shaft" kp="50" name="drive"/>')
     columns = {"shaft_pos": SWING, "shaft_torque": INERTIA * ACCELERATION / 50.0}
     with pytest.raises(RigtwinError, match="before a gear"):
         sources(tmp_path, servo, columns)
+
+
+@pytest.mark.parametrize(
+    ("position", "command"),
+    [("W_ist", "W_soll"), ("Winkel", "Sollwert Winkel"), ("shaf_act", "shaf_set")],
+)
+def test_set_points_are_read_in_german_and_by_abbreviated_names(
+    tmp_path: Path, position: str, command: str
+) -> None:
+    servo = SHAFT.replace(MOTOR, '<position joint="shaft" kp="50" kv="1" name="drive"/>')
+    known = sources(tmp_path, servo, {position: SWING, command: np.roll(SWING, 3)})
+    assert known == {"shaft.position": position, "shaft.command": command}
+
+
+def test_an_abbreviation_of_two_joints_identifies_neither(tmp_path: Path) -> None:
+    model = LEG.replace("hip_pitch", "knob")
+    with pytest.raises(RigtwinError, match="kn_pos"):
+        sources(tmp_path, model, {"kn_pos": SWING, "kn_cmd": SWING})
+
+
+@pytest.mark.parametrize("sides", [("motor_enc", "load_enc"), ("motor_enc",)])
+def test_what_the_joint_does_is_read_behind_the_gear(
+    tmp_path: Path, sides: tuple[str, ...]
+) -> None:
+    """An encoder on the motor reads the joint's angle times the gear."""
+    sensors = """<sensor><actuatorpos name="motor_enc" actuator="drive"/>
+<jointpos name="load_enc" joint="shaft"/></sensor></mujoco>"""
+    (tmp_path / "model.xml").write_text(SHAFT.replace("</mujoco>", sensors))
+    read = {"motor_enc": 0.5 * SWING, "load_enc": SWING}
+    columns = {"time": TIME, **{f"{side}_rad": read[side] for side in sides}}
+    columns["drive_cmd"] = INERTIA * ACCELERATION / 0.5
+    log = write_log(tmp_path / "log.csv", columns)
+    recording = rigtwin.describe(tmp_path / "model.xml", log).record()
+    assert recording["/sensor.load_enc"] == pytest.approx(SWING, abs=1e-6)

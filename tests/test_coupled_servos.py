@@ -43,6 +43,7 @@ class Hidden:
     changes: Mapping[str, float | str] = field(default_factory=dict)
     alter: Alter = lambda model, data, command: command
     steps: bool = False
+    reads: float = 0.0
 
 
 def rub(model: mujoco.MjModel, data: mujoco.MjData, command: Array) -> Array:
@@ -59,6 +60,11 @@ def ignore(model: mujoco.MjModel, data: mujoco.MjData, command: Array) -> Array:
     return data.qpos + error
 
 
+def misread(model: mujoco.MjModel, data: mujoco.MjData, command: Array) -> Array:
+    """Read the elbow 0.25 rad too high within its loop."""
+    return command - np.array([0.0, 0.25])
+
+
 HIDDEN = {
     "limit": Hidden({"force_limit@m1": 2.2}, {"f1": 2.2}, steps=True),
     "gains": Hidden(
@@ -70,6 +76,7 @@ HIDDEN = {
         {"stiffness@shoulder": 6.0, "offset@shoulder": -1.8},
         {"spring": 'stiffness="6" springref="0.3"'},
     ),
+    "zero": Hidden({"offset@elbow_position": 0.25}, alter=misread, reads=0.25),
     "mass": Hidden({"mass@upper": 1.8}, {"upper": 1.8}),
 }
 
@@ -88,6 +95,7 @@ def log(path: Path, hidden: Hidden, seed: int) -> Path:
     data, rows = mujoco.MjData(model), np.empty((TICKS, 5))
     for tick, now in enumerate(time):
         angles = data.qpos + NOISE * random.standard_normal(2)
+        angles[1] += hidden.reads
         rows[tick] = [now, *commands[:, tick], *angles]
         for _ in range(round(PERIOD / model.opt.timestep)):
             data.ctrl[:] = hidden.alter(model, data, commands[:, tick].copy())

@@ -121,19 +121,28 @@ class Push(NamedTuple):
     damping_gain: float  # Damping gain of a servo, Ns/m.
     band: float  # Force within a servo's deadband, N.
     limit: float  # Largest force, N.
+    zero: float  # Position that a position servo reads where its joint stands at 0, m.
 
 
-def push_law(actuator: Pusher) -> Push:
-    """Return the law of a force actuator or a servo."""
+def push_law(actuator: Pusher, zero: float = 0.0) -> Push:
+    """Return the law of a force actuator or a servo.
+
+    Parameters
+    ----------
+    actuator
+        Actuator with its parameters.
+    zero
+        Offset of the encoder within the loop of a position servo, m.
+    """
     limit = min(actuator.force_limit, UNLIMITED)
     if isinstance(actuator, Servo):
         stiffness = actuator.gains * actuator.position_gain
         damping = actuator.gains * actuator.damping_gain
-        return Push(stiffness, stiffness, damping, stiffness * actuator.deadband, limit)
+        return Push(stiffness, stiffness, damping, stiffness * actuator.deadband, limit, zero)
     if isinstance(actuator, VelocityServo):
         gain = actuator.gains * actuator.velocity_gain
-        return Push(gain, 0.0, actuator.gains * actuator.damping_gain, 0.0, limit)
-    return Push(actuator.constant, 0.0, 0.0, 0.0, limit)
+        return Push(gain, 0.0, actuator.gains * actuator.damping_gain, 0.0, limit, 0.0)
+    return Push(actuator.constant, 0.0, 0.0, 0.0, limit, 0.0)
 
 
 @compilable
@@ -151,7 +160,7 @@ def pull(law: Push, command: float, position: float) -> float:
     """
     if law.position_gain == 0.0:
         return law.constant * command
-    force = law.position_gain * (command - position)
+    force = law.position_gain * (command - position - law.zero)
     return math.copysign(max(abs(force) - law.band, 0.0), force)
 
 

@@ -322,9 +322,10 @@ def _check_force(log: Log, signal: LogSignal, slope: Slope) -> LogSignal:
     is_possible = is_clear or (has_unit and SLOPE_LOW < abs(ratio) < SLOPE_HIGHEST)
     gear = _fitting_gear(log, signal.joint, abs(ratio))
     is_doubtful = not stated and not is_possible
-    if is_doubtful and gear is not None and signal.quantity is JointQuantity.FORCE:
+    forces = (JointQuantity.FORCE, JointQuantity.FORCE_COMMAND)
+    if is_doubtful and gear is not None and signal.quantity in forces:
         text = f"before the gear of the model's actuator: times {gear:g}"
-        signal = replace(signal, scale=gear, assumed=(*signal.assumed, text))
+        signal = replace(signal, scale=gear * signal.scale, assumed=(*signal.assumed, text))
         ratio, is_clear = ratio * gear, True
     elif is_doubtful:
         question = ask(

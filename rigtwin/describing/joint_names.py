@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from rigtwin.describing.heading import split_words
 from rigtwin.describing.quantity import (
@@ -45,6 +45,8 @@ class Alias:
         Name as written in the model.
     is_part
         Whether the alias is one word of a longer name.
+    gear
+        Reading of the sensor with this name per unit of the joint's position or velocity.
     """
 
     joint: str
@@ -52,6 +54,7 @@ class Alias:
     quantity: JointQuantity | None
     name: str
     is_part: bool = False
+    gear: float = 1.0
 
 
 def list_aliases(mechanism: Mechanism) -> list[Alias]:
@@ -69,22 +72,24 @@ def list_aliases(mechanism: Mechanism) -> list[Alias]:
         The compiled MJCF or URDF.
     """
     joints = movable_joints(mechanism)
-    named: list[tuple[str, str, JointQuantity | None]] = [(joint, joint, None) for joint in joints]
+    named = [Alias(joint, (), None, joint) for joint in joints]
     for actuator in mechanism.names("actuator"):
-        named.append((mechanism.joint_of("actuator", actuator), actuator, JointQuantity.COMMAND))
+        joint = mechanism.joint_of("actuator", actuator)
+        named.append(Alias(joint, (), JointQuantity.COMMAND, actuator))
     for sensor in mechanism.names("sensor"):
         quantity = MEASURES.get(mechanism.measures(sensor))
         if quantity is not None:
-            named.append((mechanism.joint_of("sensor", sensor), sensor, quantity))
+            joint, gear = mechanism.joint_of("sensor", sensor), mechanism.sensor_gear(sensor)
+            named.append(Alias(joint, (), quantity, sensor, gear=gear))
     shared = frozenset[str]()
     if len(joints) > 1:
         shared = frozenset.intersection(*(frozenset(split_words(joint)) for joint in joints))
     aliases: dict[tuple[str, tuple[str, ...]], Alias] = {}
-    for joint, name, quantity in named:
-        for form in _forms(name, shared) if joint in joints else ():
+    for element in named:
+        for form in _forms(element.name, shared) if element.joint in joints else ():
             # The joint's own name comes first in the list, so an equal name of its sensor adds
             # nothing.
-            aliases.setdefault((joint, form), Alias(joint, form, quantity, name))
+            aliases.setdefault((element.joint, form), replace(element, words=form))
     # A body can have the name of another joint, such as the elbow's housing on the shoulder.
     taken = {form for _, form in aliases}
     for joint, body in _bodies(mechanism, joints).items():

@@ -34,6 +34,8 @@ class Match:
         Reason, for the printed table.
     rank
         Quality of the match; of two columns for one quantity the higher one is taken.
+    gear
+        Reading per unit of the joint's quantity, of a sensor on the motor's side of a gear.
     """
 
     column: str
@@ -41,3 +43,4 @@ class Match:
     quantity: JointQuantity
     why: str
     rank: float
+    gear: float = 1.0

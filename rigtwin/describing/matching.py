@@ -116,7 +116,9 @@ def _by_alias(
         # Fewer unknown words decide first, then the longer name: "left elbow" before "elbow".
         quality = (-len(meaning.unknown), len(alias.words), float(exact))
         rank = 2.0 + exact - 0.1 * len(meaning.unknown) - 0.5 * alias.is_part
-        match = Match(column, alias.joint, quantity, why, rank)
+        # What the joint itself does is measured behind the gear.
+        rank -= alias.gear != 1.0
+        match = Match(column, alias.joint, quantity, why, rank, alias.gear)
         if quality > best:
             best, matches = quality, {match.joint: match}
         elif quality == best:

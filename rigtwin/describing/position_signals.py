@@ -57,6 +57,7 @@ def position_signals(log: Log, joints: Sequence[str]) -> dict[str, LogSignal] | 
     """
     signals: dict[str, LogSignal] = {}
     matched: dict[str, tuple[str, float, str]] = {}
+    gears: dict[str, float] = {}
     for joint in joints:
         source = log.slots.stated(joint, JointQuantity.POSITION)
         if source is not None and (source.formula or source.unit):
@@ -69,7 +70,7 @@ def position_signals(log: Log, joints: Sequence[str]) -> dict[str, LogSignal] | 
             except Question as question:
                 log.questions.append(str(question))
                 continue
-            matched[joint] = match.column, 1.0, match.why
+            matched[joint], gears[joint] = (match.column, 1.0, match.why), match.gear
     for joint, (column, _, _) in matched.items():
         if not np.isfinite(log.columns.values[column]).any():
             raise RigtwinError(
@@ -81,6 +82,8 @@ def position_signals(log: Log, joints: Sequence[str]) -> dict[str, LogSignal] | 
     if units is None or len(signals) + len(matched) < len(joints):
         return None
     for joint, (column, sign, why) in matched.items():
+        gear = gears.get(joint, 1.0)
+        geared = () if gear == 1.0 else (f"before the gear of the model's actuator: over {gear:g}",)
         signals[joint] = LogSignal(
             joint=joint,
             quantity=JointQuantity.POSITION,
@@ -88,7 +91,8 @@ def position_signals(log: Log, joints: Sequence[str]) -> dict[str, LogSignal] | 
             unit=units[joint].name,
             sign=sign,
             why=why,
-            assumed=(units[joint].assumed,) if units[joint].assumed else (),
+            assumed=(*((units[joint].assumed,) if units[joint].assumed else ()), *geared),
+            scale=1.0 / gear,
         )
     return {joint: _unwrap(log, signals[joint]) for joint in joints}
 

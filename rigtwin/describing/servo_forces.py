@@ -100,6 +100,6 @@ def _compare(force: Array, law: Array, noise: float) -> float:
     power = max(float(np.var(rest)) - (NOISE_FACTOR * noise) ** 2, 0.0)
     missed = math.sqrt(power) / spread
     scale = float(np.cov(force, law)[0, 1]) / variance
-    # Errors of the law flatten the regression on it.
-    is_scaled = abs(scale - 1.0) > SCALE_ERROR + missed + (NOISE_FACTOR * noise) ** 2 / variance
-    return math.inf if is_scaled else missed
+    # Errors of the law flatten the regression on it, by their share of its variance.
+    flattened = missed**2 + (NOISE_FACTOR * noise) ** 2 / variance
+    return missed if abs(scale - 1.0) <= SCALE_ERROR + flattened else math.inf

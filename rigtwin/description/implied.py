@@ -192,6 +192,10 @@ def _add_group(
         add_free_joints(joints, mechanism, tables, free)
         for name in movers if test == SERVOS else ():
             tables[name]["effects"] = FREE_SERVO
+        for joint, name in zip(joints, sensors, strict=True) if test == SERVOS else ():
+            # The zero of a servo's encoder shows in the gravity loads alone.
+            if any(mechanism.joint(joint).gravity):
+                tables[name]["effects"] = ["offset"]
     elif test != POSITIONS:
         add_mass(mechanism, joints[0], tables)
         add_rotor(joints[0], tables)

@@ -30,10 +30,13 @@ def actuator_on(mechanism: Mechanism, joint: str) -> str | None:
 
 def sensor_on(mechanism: Mechanism, joint: str, measured: str) -> str | None:
     """Return the name of the sensor of a joint's position, velocity or force; None without one."""
-    for name in mechanism.names("sensor"):
-        if mechanism.joint_of("sensor", name) == joint and mechanism.measures(name) == measured:
-            return name
-    return None
+    known = [
+        name
+        for name in mechanism.names("sensor")
+        if mechanism.joint_of("sensor", name) == joint and mechanism.measures(name) == measured
+    ]
+    # What the joint itself does is measured behind the gear of its actuator.
+    return min(known, key=lambda name: mechanism.sensor_gear(name) != 1.0, default=None)
 
 
 def sensor_name(mechanism: Mechanism, joint: str, measured: str) -> str:

@@ -20,6 +20,7 @@ from rigtwin.description.actuator_law import (
 )
 from rigtwin.description.closed_loops import refuse_closed_loops
 from rigtwin.description.model_checks import check_text, check_values
+from rigtwin.description.naming import lacks_names, name_elements
 from rigtwin.description.replay import Joint
 from rigtwin.errors import RigtwinError
 
@@ -86,7 +87,7 @@ of this number is the inertia, kg m²."""
 def compile_model(
     path: Path, alter: Callable[[mujoco.MjSpec], None] | None = None
 ) -> mujoco.MjModel:
-    """Return the compiled model of an MJCF or a URDF.
+    """Return the compiled model of an MJCF or a URDF, whose joints and actuators all have names.
 
     Parameters
     ----------
@@ -102,8 +103,11 @@ def compile_model(
     """
     urdf = path.suffix.lower() == ".urdf"
     if not urdf and alter is None:
-        return mujoco.MjModel.from_xml_path(str(path))
+        model = mujoco.MjModel.from_xml_path(str(path))
+        if not lacks_names(model):
+            return model
     spec = mujoco.MjSpec.from_file(str(path))
+    name_elements(spec)
     if urdf:
         # URDFs often have links without inertia, such as frames of tools, which MuJoCo refuses
         # where they move.
@@ -201,6 +205,15 @@ class Mechanism:
         return SENSORS.get(
             mujoco.mjtSensor(int(self.model.sensor_type[self.number("sensor", name)])), ""
         )
+
+    def sensor_gear(self, name: str) -> float:
+        """Return what a sensor reads per unit of its joint: the gear where it is on an actuator."""
+        model, number = self.model, self.number("sensor", name)
+        if self.measures(name) not in ("position", "velocity"):
+            return 1.0
+        if int(model.sensor_objtype[number]) != mujoco.mjtObj.mjOBJ_ACTUATOR:
+            return 1.0
+        return float(model.actuator_gear[int(model.sensor_objid[number]), 0]) or 1.0
 
     def positions(self, name: str) -> bool:
         """Return whether an actuator takes a position as its command."""

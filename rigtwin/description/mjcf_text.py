@@ -96,8 +96,8 @@ class Document:
             if matches and tag.attributes.get("name") == name:
                 return tag
         raise RigtwinError(
-            f"{self.path.name} has no {element} {name!r} itself; one that it includes may have it, "
-            "and would have to be changed there"
+            f"{self.path.name} has no {element} {name!r} itself; give the {element} that name, or "
+            "change it in the file that it includes"
         )
 
     @staticmethod

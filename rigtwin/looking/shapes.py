@@ -12,6 +12,7 @@ import trimesh
 from numpy.typing import NDArray
 
 from rigtwin.description.machine import Machine
+from rigtwin.description.mechanism import compile_model
 from rigtwin.errors import RigtwinError
 from rigtwin.looking.skeleton import draw_bones
 from rigtwin.numerics.arrays import Array
@@ -103,7 +104,7 @@ class PosedMachine:
         """Raises RigtwinError if its MJCF cannot be compiled."""
         path = machine.physics.scene(machine)
         try:
-            self._model = mujoco.MjModel.from_xml_path(str(path))
+            self._model = compile_model(path)
         except ValueError as error:
             raise RigtwinError(f"{path}: {error}") from None
         self._data = mujoco.MjData(self._model)

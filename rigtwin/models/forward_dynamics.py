@@ -13,7 +13,7 @@ import numpy as np
 
 from rigtwin.components.plant import Plant
 from rigtwin.components.scales import Motion
-from rigtwin.components.servo import push, push_law, pusher_of
+from rigtwin.components.servo import push
 from rigtwin.models.basis import Passage, forms
 from rigtwin.models.coupled_joints import CoupledJoints
 from rigtwin.models.joint import SEED, SMALL
@@ -177,7 +177,7 @@ class ForwardDynamicsModel(CoupledJoints, Model[Plant]):
             ]
             return position, speed, pushed
         if component in self._layout.servos:
-            law = push_law(pusher_of(plant, component))
+            law = self._layout.servo_law(plant, component)
             command = self._drives.condition(plant, [component])[0, :: self._steps]
             at = position + self._layout.zero[component]
             passed = [push(law, *each) for each in zip(command, at, speed, strict=True)]

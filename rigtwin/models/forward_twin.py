@@ -11,7 +11,7 @@ from rigtwin.components import SERVOS, UNLIMITED, Mass, component_of
 from rigtwin.components.conditioning import actuator
 from rigtwin.components.plant import Plant
 from rigtwin.components.sensors import apply_sensor, sensor_of
-from rigtwin.components.servo import push_law, pusher_of
+from rigtwin.components.servo import pusher_of
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Machine
 from rigtwin.description.replay import ReplayOf, Row
@@ -72,7 +72,7 @@ class ForwardDynamicsTwin(CoupledJoints):
                 contacts, self._starts_of(plant)[0], inputs.prescribed, self._layout.held, h
             ),
             inputs=inputs,
-            laws=[push_law(pusher_of(plant, name)) for name in self._layout.servos],
+            laws=[self._layout.servo_law(plant, name) for name in self._layout.servos],
             drives=[self._drive(plant, name, h) for name in outputs],
             sensing=[
                 IdealSensor(r, self._layout.along[r.name], self._layout.zero[r.name])

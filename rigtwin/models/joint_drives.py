@@ -19,7 +19,7 @@ from rigtwin.components.end_stops import soften_stops
 from rigtwin.components.guide import acts
 from rigtwin.components.plant import Plant
 from rigtwin.components.sensors import sensor_of
-from rigtwin.components.servo import Push, push_law, pusher_of
+from rigtwin.components.servo import Push, pusher_of
 from rigtwin.description.machine import Machine
 from rigtwin.models.following import follow_command
 from rigtwin.models.forward_arrays import GuideContacts, Servos, StepInputs
@@ -127,7 +127,7 @@ class JointDrives:
     def serve(self, plant: Plant) -> Servos:
         """Return the servos with their conditioned commands at the steps."""
         names = self._layout.servos
-        laws = [push_law(pusher_of(plant, name)) for name in names]
+        laws = [self._layout.servo_law(plant, name) for name in names]
         return Servos(
             laws=to_records(Push, laws),
             levers=self._layout.directions(names),

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from rigtwin.components import SERVOS, Base, Body, ForceActuator, Guide, Rotor, component_of
 from rigtwin.components.body import list_parameters, list_surplus, turn_gravity
 from rigtwin.components.plant import Plant, select
+from rigtwin.components.sensors import sensor_of
+from rigtwin.components.servo import Push, push_law, pusher_of
+from rigtwin.description.component import Component
 from rigtwin.description.machine import Machine
 from rigtwin.description.replay import ReplayOf
 from rigtwin.models.joint_simulation import KEPT
@@ -37,6 +40,8 @@ class JointLayout:
         Component → its direction in the coordinates, shape (coordinates,).
     zero : dict
         Component → its position at zero coordinates, m.
+    encoders : dict
+        Servo → position sensor within its loop; None without one.
     free, held : array of int
         Indices of the free coordinates, which come first, and of the prescribed ones.
     """
@@ -56,9 +61,28 @@ class JointLayout:
         self.rotors = [rotor.name for rotor in rotors if self.along[rotor.name].any()]
         self.free = np.arange(len(replay.free))
         self.held = np.arange(len(replay.free), len(joints))
+        self.encoders = {name: self._encoder_of(components, name) for name in self.servos}
         self._heavy = {body.name: body.mjcf for body in machine.components_of(Body)}
         self._base = next((base.name for base in machine.components_of(Base)), None)
         self._changed: Memo[Multibody] = Memo(KEPT)
+
+    def _encoder_of(self, components: Mapping[str, Component], servo: str) -> str | None:
+        """Return the sensor of the position that a servo controls; None without one."""
+        along = self.along[servo]
+        return next(
+            (
+                name
+                for name, component in components.items()
+                if component.quantity == "position" and np.array_equal(self.along[name], along)
+            ),
+            None,
+        )
+
+    def servo_law(self, plant: Plant, servo: str) -> Push:
+        """Return the law of a servo, whose encoder is the one in the log, with the same error."""
+        encoder = self.encoders[servo]
+        zero = 0.0 if encoder is None else sensor_of(plant, encoder).offset
+        return push_law(pusher_of(plant, servo), zero)
 
     @property
     def inertial(self) -> tuple[str, ...]:

@@ -18,7 +18,7 @@ from rigtwin.components.guide_step import guide_step_of
 from rigtwin.components.plant import Plant, select
 from rigtwin.components.schedule import follow, scheduled_force
 from rigtwin.components.sensors import Sensor, sensor_of
-from rigtwin.components.servo import play_of, push_all, push_law, pusher_of
+from rigtwin.components.servo import Push, play_of, push_all, push_law, pusher_of
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Machine
 from rigtwin.description.replay import ReplayOf
@@ -357,7 +357,7 @@ class JointSimulation:
         rigid = RIGID * inertia.mass / h**2
         spring = rigid if guide.compliance <= 0.0 else min(1.0 / guide.compliance, rigid)
         guide_step = guide_step_of(guide, spring, self._replay.joint.rest, h)
-        law, conditioning = push_law(mover), actuator(mover, plant.computer, h)
+        law, conditioning = self._law(plant), actuator(mover, plant.computer, h)
 
         def integrate(start: Start, disturbance: Array) -> Array:
             out = np.zeros((4, len(disturbance)))
@@ -377,6 +377,17 @@ class JointSimulation:
 
         return integrate
 
+    def _law(self, plant: Plant) -> Push:
+        """Return the law of the actuator.
+
+        The encoder of a servo is the one in the log, with the same error.
+        """
+        components = self._machine.components
+        encoders = [row.name for row in self._replay.rows if row.kind == "position"]
+        encoders += [n for n in self.control.sensors if components[n].quantity == "position"]
+        zero = sensor_of(plant, encoders[0]).offset if encoders else 0.0
+        return push_law(pusher_of(plant, self.mover.name), zero)
+
     def recorded_push(self, plant: Plant, position: Array, velocity: Array) -> Array:
         """Return the force of the recorded command along a motion, N, shape (ticks,).
 
@@ -394,4 +405,4 @@ class JointSimulation:
         conditioning = actuator(mover, plant.computer, self._period)
         command = np.zeros(len(position))
         condition_all(conditioning, hold(conditioning, float(commanded[0])), commanded, 1, command)
-        return push_all(push_law(mover), command, position, velocity)
+        return push_all(self._law(plant), command, position, velocity)

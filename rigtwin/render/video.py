@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rigtwin.description.machine import Machine
+from rigtwin.description.mechanism import compile_model
 from rigtwin.errors import RigtwinError
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import RecordedTest
@@ -183,7 +184,7 @@ def _renderer(
     Its arguments are the joints' positions, the beams' heights or None, and the ghost's joint
     positions, which may be empty.
     """
-    model = mujoco.MjModel.from_xml_path(str(machine.physics.scene(machine)))
+    model = compile_model(machine.physics.scene(machine))
     cameras = [model.camera(number).name for number in range(model.ncam)]
     camera = camera or (cameras[0] if cameras else "free")
     if camera not in (*cameras, "free"):

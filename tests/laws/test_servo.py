@@ -97,7 +97,7 @@ def test_pushes_of_all_ticks_are_those_of_every_tick():
 
 def test_a_limit_that_is_left_out_is_the_widest():
     assert push_law(Servo()).limit == 1e9
-    assert push_law(ForceActuator(constant=3.0)) == (3.0, 0.0, 0.0, 0.0, 1e9)
+    assert push_law(ForceActuator(constant=3.0)) == (3.0, 0.0, 0.0, 0.0, 1e9, 0.0)
     assert push_law(ForceActuator(force_limit=2e9)).limit == 1e9
 
 
