@@ -17,8 +17,9 @@ def are_coupled(mechanism: Mechanism, joints: Sequence[str]) -> bool:
     """Return whether any two of the joints act on each other.
 
     The mass matrix M(q) is evaluated at several poses within the ranges of the joints. Joints i and
-    j act on each other where M_ij is not zero, or where the gravity load of i depends on the
-    position of j. Tendons and equalities that span two of the joints couple them too.
+    j act on each other where M_ij is not zero, or where M_ii or the gravity load of i depends on
+    the position of j, as the inertia about a vertical axis does on the angle of what it carries.
+    Tendons and equalities that span two of the joints couple them too.
 
     Parameters
     ----------
@@ -47,7 +48,7 @@ def are_coupled(mechanism: Mechanism, joints: Sequence[str]) -> bool:
         scale = np.sqrt(np.outer(np.diag(full)[at], np.diag(full)[at]))
         off = np.abs(full[np.ix_(at, at)]) / np.maximum(scale, 1e-300)
         np.fill_diagonal(off, 0.0)
-        if off.max() > SHARE or _load_moves(model, data, numbers, at, weights):
+        if off.max() > SHARE or _acts_on_others(model, data, numbers, at, weights):
             return True
     return False
 
@@ -70,15 +71,17 @@ def _weights(mechanism: Mechanism, at: Sequence[int]) -> float:
     return float(np.sum(model.body_mass) * np.linalg.norm(model.opt.gravity)) * len(at)
 
 
-def _load_moves(
+def _acts_on_others(
     model: mujoco.MjModel,
     data: mujoco.MjData,
     numbers: Sequence[int],
     at: Sequence[int],
     weights: float,
 ) -> bool:
-    """Return whether the gravity load of one joint changes with the position of another one."""
-    before = data.qfrc_bias[list(at)].copy()
+    """Return whether inertia or gravity load of one joint changes with the position of another."""
+    before, full = data.qfrc_bias[list(at)].copy(), np.zeros((model.nv, model.nv))
+    mujoco.mj_fullM(model, data, full)
+    inertia = np.diag(full)[at]
     for index, number in enumerate(numbers):
         place = int(model.jnt_qposadr[number])
         original = float(data.qpos[place])
@@ -88,8 +91,11 @@ def _load_moves(
         change = np.abs(data.qfrc_bias[list(at)] - before)
         # A joint's gravity load may depend on its own position without any coupling.
         change[index] = 0.0
+        mujoco.mj_fullM(model, data, full)
+        growth = np.abs(np.diag(full)[at] / np.maximum(inertia, 1e-300) - 1.0)
+        growth[index] = 0.0
         data.qpos[place] = original
-        if change.max() > SHARE * max(weights, 1e-300):
+        if change.max() > SHARE * max(weights, 1e-300) or growth.max() > SHARE:
             return True
     mujoco.mj_forward(model, data)
     return False

@@ -55,6 +55,7 @@ PRESCRIBED = [
     "stribeck",
     "load_friction",
     "drag",
+    "cogging",
     "position_force",
     "end_stops",
 ]
