@@ -97,4 +97,13 @@ def confirm(
         fits += reduced
     pool = [scorer.score(each) for each in (fitter.nominal_fit, *fits)]
     posterior = HypothesisPosterior(pool, fitter, candidates, thresholds)
+    best = posterior.best.fit
+    if best.effects and posterior.has_unexplained_residual:
+        # A free motion has many minima close to each other: what remains may be that of a poor one.
+        again = refit_with_tolerances(
+            fitter, fitter.refine(best.effects, best.values), PERTURBATIONS
+        )
+        if again.misfit < best.misfit:
+            pool = [each for each in pool if each.fit is not best] + [scorer.score(again)]
+            posterior = HypothesisPosterior(pool, fitter, candidates, thresholds)
     return Confirmation(posterior.best.fit, not posterior.has_unexplained_residual)
