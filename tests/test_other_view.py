@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -119,3 +120,42 @@ def test_forces_of_joints_without_actuators_are_no_commands(tmp_path: Path) -> N
     described = rigtwin.describe(model, write_log(tmp_path / "log.csv", swing(0.45, 0.07)))
     assert described.reading.kind.test == "inverse dynamics"
     assert all(describe_otherwise(described, view) is None for view in VIEWS["inverse dynamics"])
+
+
+SERVO = """<mujoco><option timestep="0.001"/><worldbody><body name="link">
+<joint name="pivot" axis="0 1 0" damping="0.1" armature="0.02" {friction}/>
+<inertial pos="0 0 -0.2" mass="0.6" diaginertia="0.01 0.01 0.001"/></body></worldbody>
+<actuator><position name="servo" joint="pivot" kp="40" kv="2"/></actuator></mujoco>"""
+ROW, FRICTION = 0.01, 0.15
+
+
+def serve(friction: str, seed: int) -> dict[str, Array]:
+    """Time, set point and angle of a servo, read at the end of the row that a set point acts in."""
+    random = np.random.default_rng(seed)
+    model = mujoco.MjModel.from_xml_string(SERVO.format(friction=friction))
+    data, time = mujoco.MjData(model), ROW * np.arange(1000)
+    rates, phases = random.uniform(0.5, 5.0, (2, 4))
+    waves = 0.25 * np.sin(rates[:, None] * time + phases[:, None]).sum(0)
+    commands, angles = waves - waves[0], np.zeros(len(time))
+    for row, command in enumerate(commands):
+        data.ctrl[0] = command
+        for _ in range(round(ROW / model.opt.timestep)):
+            mujoco.mj_step(model, data)
+        angles[row] = data.qpos[0]
+    return {"t": time, "cmd": commands, "pos": angles + 1e-4 * random.standard_normal(len(time))}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("friction", ["", f'frictionloss="{FRICTION}"'])
+def test_rows_may_hold_the_state_after_their_command(tmp_path: Path, friction: str) -> None:
+    model = tmp_path / "servo.xml"
+    model.write_text(SERVO.format(friction=""))
+    fitted, held_out = (
+        write_log(tmp_path / f"{seed}.csv", serve(friction, seed)) for seed in (1, 2)
+    )
+    answer = rigtwin.diagnose(fitted, machine=model, held_out=held_out)
+    assert "the state after its command" in answer.answer.notes[0]
+    assert [str(effect.name) for effect in answer.effects] == ["coulomb@pivot"] * bool(friction)
+    for effect in answer.effects:
+        assert effect.parameters["coulomb"].value == pytest.approx(FRICTION, rel=0.05)
+    assert answer.verdict == ("explained" if friction else "no gap")

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from rigtwin.api.describing import record_again
-from rigtwin.api.diagnosis_data import DiagnosisData, Recorded, as_list, has_duplicate, read_data
+from rigtwin.api.diagnosis_data import Recorded, as_list, has_duplicate, read_data
 from rigtwin.api.machines import described_machine, machine_of
-from rigtwin.api.recordings import Recording, resolve_recording
+from rigtwin.api.other_answers import look_otherwise
+from rigtwin.api.recordings import resolve_recording
 from rigtwin.api.twin import Settings, names_of, require_unrecorded, twin_of
-from rigtwin.describing.other_view import VIEWS, OtherView, describe_otherwise
 from rigtwin.description.machine import Machine
 from rigtwin.diagnosis.change import Changes
 from rigtwin.diagnosis.changes import find_changes
@@ -19,7 +18,7 @@ from rigtwin.diagnosis.data_checks import require_fit
 from rigtwin.diagnosis.diagnose import diagnose as find_reasons
 from rigtwin.diagnosis.first_look import FirstLook as FirstLook
 from rigtwin.diagnosis.result import Diagnosis
-from rigtwin.diagnosis.thresholds import STANDARD, Thresholds
+from rigtwin.diagnosis.thresholds import STANDARD
 from rigtwin.errors import RigtwinError
 from rigtwin.simulation.experiment import find_experiment
 from rigtwin.studies.friction_spikes import Calibration
@@ -124,71 +123,7 @@ def diagnose(
     # Settings and exclusions name components, which another view does not have.
     if settings or without or exclude:
         return diagnosis
-    return _look_otherwise(diagnosis, data, thresholds, progress)
-
-
-def _look_otherwise(
-    diagnosis: Diagnosis,
-    data: DiagnosisData,
-    thresholds: Thresholds,
-    progress: Callable[[str, int], object],
-) -> Diagnosis:
-    """Return the answer of another view of the logs that explains enough, see `other_view`.
-
-    `diagnosis`, the answer of the first view, is returned where there is none.
-    """
-    closed = _closed_share(diagnosis)
-    for view, seen in _other_views(data, closed):
-        other = find_reasons(
-            seen.machine,
-            seen.recordings,
-            None,
-            seen.held_out,
-            (),
-            progress=progress,
-            thresholds=thresholds,
-        )
-        if other.verdict == "no gap" and _names_force_sensor(diagnosis, data.machine):
-            continue
-        if other.verdict != "unusable" and _closed_share(other) >= view.least:
-            return _with_note(other, diagnosis, view.reason)
-    return diagnosis
-
-
-def _closed_share(diagnosis: Diagnosis) -> float:
-    """Return the share of the gap that an answer closes, 1 where there is no gap to close."""
-    if diagnosis.verdict not in ("unknown", "partly explained") or diagnosis.gap is None:
-        return 1.0
-    return diagnosis.gap.shrinkage_held_out.value if diagnosis.effects else 0.0
-
-
-def _names_force_sensor(diagnosis: Diagnosis, machine: Machine) -> bool:
-    """Return whether an answer names an effect of a force sensor, which only forces can show."""
-    sensors = {name for name, part in machine.components.items() if part.quantity == "force"}
-    return any(finding.name.component in sensors for finding in diagnosis.effects)
-
-
-def _other_views(data: DiagnosisData, closed: float) -> Iterator[tuple[OtherView, DiagnosisData]]:
-    """Yield the views in which logs are worth judging where an answer closes a share of the gap."""
-    recordings = (*data.recordings, *data.held_out)
-    origins = [recording.origin for recording in recordings if isinstance(recording, Recording)]
-    logs = [origin for origin in origins if origin is not None]
-    if len(logs) < len(recordings):
-        return
-    described = logs[0].described
-    for view in VIEWS.get(described.reading.kind.test, ()):
-        if closed >= view.below or (seen := describe_otherwise(described, view)) is None:
-            continue
-        again, count = tuple(record_again(seen, logs)), len(data.recordings)
-        yield view, DiagnosisData(seen.machine, again[:count], again[count:])
-
-
-def _with_note(diagnosis: Diagnosis, before: Diagnosis, reason: str) -> Diagnosis:
-    """Return an answer with a note on the view that it replaces."""
-    after = diagnosis.answer
-    note = f"{reason}; otherwise the answer would be {before.verdict!r}"
-    seconds = before.answer.seconds + after.seconds
-    return replace(diagnosis, answer=replace(after, notes=(note, *after.notes), seconds=seconds))
+    return look_otherwise(diagnosis, data, thresholds, progress)
 
 
 def what_changed(

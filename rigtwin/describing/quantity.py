@@ -40,7 +40,8 @@ WORDS: dict[JointQuantity, frozenset[str]] = {
         "jointvel geschwindigkeit drehzahl vitesse"
     ),
     JointQuantity.FORCE: _words(
-        "tau torque torques force forces effort efforts trq tq frc moment loadcell kraft drehmoment"
+        "tau torque torques force forces effort efforts trq tq frc moment loadcell "
+        "fx fy fz mx my mz kraft drehmoment"
     ),
     JointQuantity.CURRENT: _words("current currents cur curr amps amperage strom courant"),
     JointQuantity.VOLTAGE: _words("voltage volt volts"),

@@ -1,0 +1,167 @@
+"""Answers that take a log otherwise, where the first answer does not explain it.
+
+A log may be judged as another kind of test, see `other_view`. Its rows may also hold the state
+after their command: a loop that sends a command, waits and reads the sensors writes such rows,
+whose commands act one row before the next row begins.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rigtwin.api.describing import record_again
+from rigtwin.api.diagnosis_data import DiagnosisData
+from rigtwin.api.recordings import Recording
+from rigtwin.describing.other_view import VIEWS, describe_otherwise
+from rigtwin.description.implied import FORCES, SERVOS
+from rigtwin.description.machine import Machine
+from rigtwin.diagnosis.diagnose import diagnose as find_reasons
+from rigtwin.diagnosis.evidence import Evidence, relative_errors
+from rigtwin.diagnosis.result import Diagnosis
+from rigtwin.diagnosis.thresholds import Thresholds
+from rigtwin.recording import RecordedTest
+
+EARLIER = 0.7
+"""Share of the nominal twin's error that commands one row earlier must leave at most to be
+tried."""
+COMMANDS = "/command"
+"""Topic of the commands."""
+AFTER = (
+    "each row is taken to hold the state after its command, as the motion needs fewer effects then"
+)
+"""Why the commands of a log are taken one row earlier."""
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """Logs taken otherwise.
+
+    Attributes
+    ----------
+    data
+        Recordings of the logs.
+    least
+        Share of the gap that their answer must close to be given.
+    reason
+        Why the logs are taken so, for a note.
+    """
+
+    data: DiagnosisData
+    least: float
+    reason: str
+
+
+def look_otherwise(
+    diagnosis: Diagnosis,
+    data: DiagnosisData,
+    thresholds: Thresholds,
+    progress: Callable[[str, int], object],
+) -> Diagnosis:
+    """Return the answer to logs taken otherwise, where that explains enough.
+
+    Parameters
+    ----------
+    diagnosis
+        First answer, which is returned where no other one explains enough.
+    data
+        Recordings that were judged.
+    thresholds
+        Thresholds of the search.
+    progress
+        Called with the name of a stage and the number of steps done in it.
+    """
+    if diagnosis.verdict in ("no gap", "unusable"):
+        return diagnosis
+    for attempt in _attempts(data, _closed_share(diagnosis)):
+        other = find_reasons(
+            attempt.data.machine,
+            attempt.data.recordings,
+            None,
+            attempt.data.held_out,
+            (),
+            progress=progress,
+            thresholds=thresholds,
+        )
+        if other.verdict == "no gap" and _names_force_sensor(diagnosis, data.machine):
+            continue
+        if other.verdict != "unusable" and _closed_share(other) >= attempt.least:
+            # Of two explanations the one with fewer effects is given.
+            simpler = len(other.effects) < len(diagnosis.effects)
+            if simpler or _closed_share(diagnosis) < 1.0:
+                return _with_note(other, diagnosis, attempt.reason)
+    return diagnosis
+
+
+def _closed_share(diagnosis: Diagnosis) -> float:
+    """Return the share of the gap that an answer closes, 1 where there is no gap to close."""
+    if diagnosis.verdict not in ("unknown", "partly explained") or diagnosis.gap is None:
+        return 1.0
+    return diagnosis.gap.shrinkage_held_out.value if diagnosis.effects else 0.0
+
+
+def _names_force_sensor(diagnosis: Diagnosis, machine: Machine) -> bool:
+    """Return whether an answer names an effect of a force sensor, which only forces can show."""
+    sensors = {name for name, part in machine.components.items() if part.quantity == "force"}
+    return any(finding.name.component in sensors for finding in diagnosis.effects)
+
+
+def _attempts(data: DiagnosisData, closed: float) -> Iterator[Attempt]:
+    """Yield the ways to take logs otherwise, of which an answer closes a share of the gap."""
+    recordings = (*data.recordings, *data.held_out)
+    origins = [recording.origin for recording in recordings if isinstance(recording, Recording)]
+    logs = [origin for origin in origins if origin is not None]
+    if len(logs) < len(recordings):
+        return
+    described = logs[0].described
+    if described.reading.kind.test in (FORCES, SERVOS) and (early := _with_commands_earlier(data)):
+        yield Attempt(early, 1.0, AFTER)
+    for view in VIEWS.get(described.reading.kind.test, ()):
+        if closed >= view.below or (seen := describe_otherwise(described, view)) is None:
+            continue
+        yield Attempt(
+            _record_again(seen.machine, record_again(seen, logs), data), view.least, view.reason
+        )
+
+
+def _record_again(
+    machine: Machine, recordings: Sequence[RecordedTest], data: DiagnosisData
+) -> DiagnosisData:
+    """Return recordings in the place of those of some data, in the same order."""
+    count = len(data.recordings)
+    return DiagnosisData(machine, tuple(recordings[:count]), tuple(recordings[count:]))
+
+
+def _with_commands_earlier(data: DiagnosisData) -> DiagnosisData | None:
+    """Return recordings whose commands act one row earlier; None where that predicts no better."""
+    recordings = [_advance(recording) for recording in (*data.recordings, *data.held_out)]
+    early = _record_again(data.machine, recordings, data)
+    is_better = _nominal_error(early) < EARLIER * _nominal_error(data)
+    return early if is_better else None
+
+
+def _advance(recording: RecordedTest) -> RecordedTest:
+    """Return a recording whose commands act one row earlier."""
+    columns = dict(recording.columns)
+    columns[COMMANDS] = {
+        name: np.append(values[1:], values[-1]) for name, values in columns[COMMANDS].items()
+    }
+    return replace(recording, columns=columns)
+
+
+def _nominal_error(data: DiagnosisData) -> float:
+    """Return the relative error with which the nominal twin predicts the recordings to fit."""
+    machine, recordings = data.machine, data.recordings
+    configurations = [machine.configuration_of(recording) for recording in recordings]
+    evidence = Evidence(machine, recordings, configurations)
+    return float(np.sqrt(np.mean(relative_errors(evidence, evidence.plant) ** 2)))
+
+
+def _with_note(diagnosis: Diagnosis, before: Diagnosis, reason: str) -> Diagnosis:
+    """Return an answer with a note on the way in which a log is taken."""
+    after = diagnosis.answer
+    note = f"{reason}; otherwise the answer would be {before.verdict!r}"
+    seconds = before.answer.seconds + after.seconds
+    return replace(diagnosis, answer=replace(after, notes=(note, *after.notes), seconds=seconds))
