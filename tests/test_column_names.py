@@ -171,3 +171,12 @@ def test_what_the_joint_does_is_read_behind_the_gear(
     log = write_log(tmp_path / "log.csv", columns)
     recording = rigtwin.describe(tmp_path / "model.xml", log).record()
     assert recording["/sensor.load_enc"] == pytest.approx(SWING, abs=1e-6)
+
+
+def test_a_general_word_identifies_a_joint_without_another(tmp_path: Path) -> None:
+    model = LEG.replace("hip_pitch", "motor_shaft").replace("knee", "load_shaft")
+    columns = {"motor angle [rad]": SWING, "load angle [rad]": SWING}
+    columns |= {"motor_shaft_cmd": SWING, "load_shaft_cmd": SWING}
+    known = sources(tmp_path, model, columns)
+    assert known["motor_shaft.position"] == "motor angle"
+    assert known["load_shaft.position"] == "load angle"

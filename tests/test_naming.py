@@ -27,6 +27,7 @@ def test_elements_without_a_name_are_named_after_what_they_belong_to(tmp_path: P
     (tmp_path / "arm.xml").write_text(ARM)
     mechanism = Mechanism(tmp_path / "arm.xml")
     assert mechanism.names("joint") == ["upper_joint", "wrist", "body_joint"]
+    assert mechanism.names("body") == ["world", "upper", "wrist_body"]
     assert mechanism.names("actuator") == ["wrist_actuator", "wrist_actuator_2"]
 
 

@@ -129,21 +129,28 @@ def spell_out(words: tuple[str, ...], aliases: Sequence[Alias]) -> tuple[str, ..
 
 
 def _distinctive_words(joints: Sequence[str], aliases: Sequence[Alias]) -> list[tuple[str, str]]:
-    """Joints, and the words of their own names that no alias of another joint contains."""
+    """Joints, and the words of their own names that no alias of another joint contains.
+
+    A word such as motor, which names parts of any joint, counts where the name has no other: of
+    motor_shaft beside load_shaft.
+    """
     vocabulary = {
         joint: {word for alias in aliases if alias.joint == joint for word in alias.words}
         for joint in joints
     }
     plain = QUANTITY_WORDS | MEASURED | COMMANDED | COORDINATES
-    return [
-        (joint, word)
-        for joint in joints
-        for word in split_words(joint)
-        if len(word) >= SHORTEST_WORD
-        and not word.isdigit()
-        and word not in plain
-        and not any(word in vocabulary[other] for other in joints if other != joint)
-    ]
+    found: list[tuple[str, str]] = []
+    for joint in joints:
+        own = [
+            word
+            for word in split_words(joint)
+            if len(word) >= SHORTEST_WORD
+            and not word.isdigit()
+            and not any(word in vocabulary[other] for other in joints if other != joint)
+        ]
+        telling = [word for word in own if word not in plain]
+        found += [(joint, word) for word in telling or own if word not in COMMANDED]
+    return found
 
 
 def _forms(name: str, shared: frozenset[str]) -> list[tuple[str, ...]]:

@@ -11,7 +11,7 @@ MOVING = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
 
 
 def lacks_names(model: mujoco.MjModel) -> bool:
-    """Return whether a hinge, a slide or an actuator of a model has no name.
+    """Return whether a hinge or slide of a model, its body or an actuator has no name.
 
     Parameters
     ----------
@@ -20,12 +20,13 @@ def lacks_names(model: mujoco.MjModel) -> bool:
     """
     joints = [number for number in range(model.njnt) if model.jnt_type[number] in MOVING]
     unnamed = [not model.joint(number).name for number in joints]
+    unnamed += [not model.body(model.jnt_bodyid[number]).name for number in joints]
     unnamed += [not model.actuator(number).name for number in range(model.nactuator)]
     return any(unnamed)
 
 
 def name_elements(spec: mujoco.MjSpec) -> None:
-    """Name the joints after their bodies, and the actuators after what they act on.
+    """Name the joints after their bodies or the reverse, and actuators after what they act on.
 
     Parameters
     ----------
@@ -37,6 +38,10 @@ def name_elements(spec: mujoco.MjSpec) -> None:
     for joint in spec.joints:
         if not joint.name and int(joint.type) in MOVING:
             joint.name = _choose(f"{joint.parent.name or 'body'}_joint", taken)
+    taken = {body.name for body in spec.bodies}
+    for joint in spec.joints:
+        if not joint.parent.name and int(joint.type) in MOVING:
+            joint.parent.name = _choose(f"{joint.name}_body", taken)
     taken = {actuator.name for actuator in spec.actuators}
     for actuator in spec.actuators:
         if not actuator.name:
