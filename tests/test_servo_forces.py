@@ -89,3 +89,22 @@ def test_the_base_of_coupled_joints_may_be_off_level(
     described = rigtwin.describe(tmp_path / "leg.xml", write_log(tmp_path / "log.csv", columns))
     names = {effect.kind.name for effect in described.machine.effects() if effect.group == "base"}
     assert names == {f"tilt_{axis}" for axis in tilts}
+
+
+SHAFT = """<mujoco><option gravity="0 0 0"/><worldbody><body name="motor">
+<joint name="motor" axis="1 0 0"/><inertial pos="0 0 0" mass="1" diaginertia="0.02 0.02 0.02"/>
+</body><body name="load"><joint name="load" axis="1 0 0"/>
+<inertial pos="0 0 0" mass="1" diaginertia="0.1 0.1 0.1"/></body></worldbody>
+<tendon><fixed name="shaft" stiffness="20"><joint joint="load" coef="1"/>
+<joint joint="motor" coef="-1"/></fixed></tendon>
+<actuator><motor name="drive" joint="motor"/></actuator></mujoco>"""
+
+
+def test_the_spring_between_two_joints_may_be_another(tmp_path: Path) -> None:
+    (tmp_path / "shaft.xml").write_text(SHAFT)
+    time, (motor, load), _ = motion(8)
+    columns = {"time": time, "drive_cmd": motor, "motor_pos": motor, "load_pos": load}
+    described = rigtwin.describe(tmp_path / "shaft.xml", write_log(tmp_path / "log.csv", columns))
+    assert described.reading.kind.test == "force commands"
+    names = {effect.kind.name for effect in described.machine.effects() if effect.group == "shaft"}
+    assert names == {"coulomb", "viscous", "stiffness"}

@@ -191,6 +191,7 @@ def _add_group(
     if test != POSITIONS and len(joints) > 1:
         replay["free"] = list(joints)
         add_free_joints(joints, mechanism, tables, free)
+        add_tendons(mechanism, joints, tables)
         for name in movers if test == SERVOS else ():
             tables[name]["effects"] = FREE_SERVO
         for joint, name in zip(joints, sensors, strict=True) if test == SERVOS else ():

@@ -94,12 +94,14 @@ def add_base(mechanism: Mechanism, tables: dict[str, dict[str, Any]]) -> None:
 def add_tendons(
     mechanism: Mechanism, joints: Sequence[str], tables: dict[str, dict[str, Any]]
 ) -> None:
-    """Add the fixed tendons with friction that couples joints, such as those of a wrist."""
+    """Add the fixed tendons that couple joints: by friction, as in a wrist, or by a spring."""
     for tendon in mechanism.names("tendon"):
         # A tendon that passes another joint too would see a motion that is not measured.
         along = [joint for joint, _ in mechanism.acts_on("tendon", tendon)]
         if along and set(along) <= set(joints):
-            tables[identifier(tendon)] = {"tendon": tendon, "effects": ["coulomb", "viscous"]}
+            effects = ["coulomb", "viscous"]
+            effects += ["stiffness"] if mechanism.friction("tendon", tendon)["stiffness"] else []
+            tables[identifier(tendon)] = {"tendon": tendon, "effects": effects}
 
 
 def add_rotor(joint: str, tables: dict[str, dict[str, Any]]) -> None:
