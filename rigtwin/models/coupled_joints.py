@@ -192,6 +192,7 @@ class CoupledJoints:
             *self._layout.inertial,
             *self._replay.moved_by,
             *self._seen,
+            *(name for name in self._layout.encoders.values() if name is not None),
             "computer",
         }
         return select(plant, sorted(names))
