@@ -97,13 +97,22 @@ def confirm(
         fits += reduced
     pool = [scorer.score(each) for each in (fitter.nominal_fit, *fits)]
     posterior = HypothesisPosterior(pool, fitter, candidates, thresholds)
-    best = posterior.best.fit
-    if best.effects and posterior.has_unexplained_residual:
-        # A free motion has many minima close to each other: what remains may be that of a poor one.
-        again = refit_with_tolerances(
-            fitter, fitter.refine(best.effects, best.values), PERTURBATIONS
-        )
-        if again.misfit < best.misfit:
-            pool = [each for each in pool if each.fit is not best] + [scorer.score(again)]
-            posterior = HypothesisPosterior(pool, fitter, candidates, thresholds)
+    better = _fit_again(fitter, posterior)
+    if better is not None:
+        best = posterior.best.fit
+        pool = [each for each in pool if each.fit is not best] + [scorer.score(better)]
+        posterior = HypothesisPosterior(pool, fitter, candidates, thresholds)
     return Confirmation(posterior.best.fit, not posterior.has_unexplained_residual)
+
+
+def _fit_again(fitter: Fitter, posterior: HypothesisPosterior) -> Fit | None:
+    """Return a better fit of the best hypothesis where more than noise remains, else None.
+
+    A free motion has many minima close to each other: what remains may be that of a poor one.
+    """
+    best = posterior.best.fit
+    if not best.effects or not posterior.has_unexplained_residual:
+        return None
+    refined = fitter.refine(best.effects, best.values)
+    again = refit_with_tolerances(fitter, refined, PERTURBATIONS)
+    return again if again.misfit < best.misfit else None
