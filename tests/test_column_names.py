@@ -180,3 +180,11 @@ def test_a_general_word_identifies_a_joint_without_another(tmp_path: Path) -> No
     known = sources(tmp_path, model, columns)
     assert known["motor_shaft.position"] == "motor angle"
     assert known["load_shaft.position"] == "load angle"
+
+
+def test_a_moment_about_an_axis_is_a_joints_force_beside_its_name_alone(tmp_path: Path) -> None:
+    columns = {"shaft_pos": SWING, "Mz_shaft": INERTIA * ACCELERATION, "mx": SWING, "temps": TIME}
+    assert sources(tmp_path, SHAFT, columns)["shaft.force"] == "Mz_shaft"
+    del columns["Mz_shaft"]
+    with pytest.raises(RigtwinError, match="no column is a measured force"):
+        sources(tmp_path, SHAFT, columns)

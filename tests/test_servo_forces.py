@@ -108,3 +108,30 @@ def test_the_spring_between_two_joints_may_be_another(tmp_path: Path) -> None:
     assert described.reading.kind.test == "force commands"
     names = {effect.kind.name for effect in described.machine.effects() if effect.group == "shaft"}
     assert names == {"coulomb", "viscous", "stiffness"}
+
+
+FLOOR = """[machine]
+name = "leg"
+model = "leg.xml"
+[components.floor]
+body = "world"
+type = "base"
+effects = ["tilt_y"]
+[[replays]]
+test = "inverse dynamics"
+"""
+
+
+def test_a_described_base_takes_the_place_of_the_implied_one(tmp_path: Path) -> None:
+    (tmp_path / "leg.xml").write_text(LEG)
+    (tmp_path / "leg.toml").write_text(FLOOR)
+    machine = rigtwin.machine(tmp_path / "leg.toml")
+    tilts = [effect for effect in machine.effects() if effect.kind.name.startswith("tilt")]
+    assert [(effect.group, effect.kind.name) for effect in tilts] == [("floor", "tilt_y")]
+
+
+def test_forces_that_the_owner_states_are_judged(tmp_path: Path) -> None:
+    assert kind(tmp_path, 0) == "servos"
+    columns = {f"{joint}.force": f"{joint}_torque" for joint in ("hip", "knee")}
+    described = rigtwin.describe(tmp_path / "leg.xml", tmp_path / "log.csv", columns=columns)
+    assert described.reading.kind.test == "inverse dynamics"

@@ -1,8 +1,8 @@
 """Answers that take a log otherwise, where the first answer does not explain it.
 
 A log may be judged as another kind of test, see `other_view`. Its rows may also hold the state
-after their command: a loop that sends a command, waits and reads the sensors writes such rows,
-whose commands act one row before the next row begins.
+after their command, as a loop writes them that sends a command, waits and then reads the sensors.
+The command of such a row acts from the row before it on.
 """
 
 from __future__ import annotations
@@ -136,6 +136,9 @@ def _record_again(
 
 def _with_commands_earlier(data: DiagnosisData) -> DiagnosisData | None:
     """Return recordings whose commands act one row earlier; None where that predicts no better."""
+    commands = [c for each in data.recordings for c in each.columns.get(COMMANDS, {}).values()]
+    if not any(np.ptp(command) > 0.0 for command in commands):
+        return None
     recordings = [_advance(recording) for recording in (*data.recordings, *data.held_out)]
     early = _record_again(data.machine, recordings, data)
     is_better = _nominal_error(early) < EARLIER * _nominal_error(data)

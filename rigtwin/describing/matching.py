@@ -10,7 +10,7 @@ import numpy as np
 from rigtwin.describing.heading import read_words, split_words, stated_unit
 from rigtwin.describing.joint_names import QUANTITY_WORDS, Alias, list_aliases, spell_out
 from rigtwin.describing.match import NUMBERED, REMAINING, UNNAMED, Match
-from rigtwin.describing.quantity import ANGULAR, COORDINATES, MEASURED, JointQuantity
+from rigtwin.describing.quantity import ANGULAR, AXIAL, COORDINATES, MEASURED, JointQuantity
 from rigtwin.describing.question import enumerate_names
 from rigtwin.description.joint_elements import actuator_on, movable_joints
 from rigtwin.description.mechanism import Mechanism
@@ -153,6 +153,8 @@ def _by_kind(
     meaning = read_words(words, unit)
     quantity = _commanded(meaning.quantity) if meaning.commanded else meaning.quantity
     rank = 1.0 - 0.1 * len(meaning.unknown)
+    if AXIAL & set(words):
+        return None
     if quantity is not None:
         kind, owners = _owners(mechanism, quantity, words, unit, joints)
     elif len(words) == 1 and words[0] in COORDINATES:

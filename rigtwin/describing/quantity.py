@@ -87,6 +87,9 @@ UNIT_WORDS = {
     "rps": "rev/s",
 }
 """Word in a column's name → unit that it states."""
+AXIAL = _words("fx fy fz mx my mz")
+"""Forces and moments along an axis. Without the name of a joint they may be those of another
+sensor, as mx is of a magnetometer."""
 COORDINATES = _words("x y z")
 """Names of a position along a line."""
 ANGULAR = _words("theta phi angle angles ang omega rpm")
@@ -95,9 +98,7 @@ TESTS = _words("episode ep run trial rollout traj trajectory repetition rep expe
 """Words that name the number of a test."""
 COUNTING = _words("index idx id number nr no num")
 """Words that may stand beside them."""
-TIME = _words(
-    "t time timespan timestamp timestamps stamp clock elapsed seconds secs sec zeit temps"
-)
+TIME = _words("t time timespan timestamp timestamps stamp clock elapsed seconds secs sec zeit")
 """Words that name the time."""
 TIME_UNITS = {
     "s": "s",

@@ -221,7 +221,7 @@ def _question(
     pulling = [
         a for a in mechanism.names("actuator") if mechanism.tendon_of("actuator", a) is not None
     ]
-    if pulling and not measured:
+    if pulling and not measured and any(actuator_on(mechanism, j) is None for j in joints):
         return RigtwinError(
             f"actuator {pulling[0]} pulls a tendon; such a machine needs a written description, "
             "docs/machines.md, joints that are free"

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from rigtwin.describing.command_signals import position_command
-from rigtwin.describing.log import Log
+from rigtwin.describing.log import STATED, Log
 from rigtwin.describing.quantity import JointQuantity
 from rigtwin.describing.replay_kind import are_servos
 from rigtwin.describing.signal import LogSignal
@@ -49,6 +49,9 @@ def come_from_servos(
         Joint → measured force.
     """
     if not forces or not are_servos(log.mechanism, list(positions)):
+        return False
+    # A force whose column the owner states is meant to be judged.
+    if any(force.why == STATED for force in forces.values()):
         return False
     errors = [
         _law_error(log, joint, positions[joint], log.values(force))

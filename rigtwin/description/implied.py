@@ -97,7 +97,11 @@ def expand(
     # A key of the description replaces the implied one. A value that is not a table stays, so that
     # the reader of the components notes it.
     components: dict[str, Any] = {}
+    # A machine has one base: one of another name in the description takes the implied one's place.
+    bases = {n for n, t in written.items() if isinstance(t, Mapping) and t.get("type") == "base"}
     for name, table in implied.components.items():
+        if table.get("type") == "base" and bases and name not in bases:
+            continue
         changes = written.get(name, {})
         components[name] = {**table, **changes} if isinstance(changes, Mapping) else changes
     # Components that no test implies, such as a base, are added as they are.
@@ -151,6 +155,9 @@ def _expand_replay(
         group_keys.setdefault("name", "all joints" if together else identifier(group[0]))
         free = swinging(mechanism, joints)
         _add_group(test, group, group_keys, mechanism, implied, free, velocities)
+    if together:
+        # The base comes last: a joint may have its name.
+        add_base(mechanism, implied.components)
 
 
 def _add_group(
@@ -168,8 +175,6 @@ def _add_group(
     place of their position.
     """
     tables = implied.components
-    if test != POSITIONS and len(joints) > 1:
-        add_base(mechanism, tables)
     sensors: list[str] = []
     for joint in joints:
         measured = "velocity" if joint in velocities else "position"

@@ -80,7 +80,8 @@ def sensor_table(mechanism: Mechanism, joint: str, measured: str) -> dict[str, A
 def add_base(mechanism: Mechanism, tables: dict[str, dict[str, Any]]) -> None:
     """Add the base of coupled joints under gravity, which may be off level."""
     gravity = np.abs(mechanism.model.opt.gravity)
-    if not gravity.any():
+    known = any(table.get("type") == "base" for table in tables.values())
+    if known or not gravity.any():
         return
     # A turn about the direction of gravity has no effect.
     level = [axis for axis, share in zip("xyz", gravity / gravity.max(), strict=True) if share < UP]
