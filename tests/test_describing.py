@@ -283,12 +283,14 @@ def test_a_command_of_the_other_sign_is_turned(tmp_path: Path, motion: Columns):
     assert np.corrcoef(seen, motion["q2"])[0, 1] > 0.9
 
 
-def test_torque_commands_push_and_measured_torques_do_not(tmp_path: Path, motion: Columns):
+def test_torques_of_all_joints_are_held_against_inverse_dynamics(tmp_path: Path, motion: Columns):
+    """The motion that an arm's torques predict runs away from the measured one."""
     names = {"time": "time", "q1": "q1", "q2": "q2", "tau1": "tau_cmd1", "tau2": "tau_cmd2"}
     answer = described(tmp_path, renamed(motion, names), MOTORS)
-    assert answer.reading.kind.test == "force commands"
-    assert {row.name for row in answer.machine.rows} == {"shoulder_position", "elbow_position"}
+    assert answer.reading.kind.test == "inverse dynamics"
+    assert {row.name for row in answer.machine.rows} == {"shoulder_force", "elbow_force"}
     stated = described(tmp_path, motion, MOTORS, test="force-commands")
+    assert {row.name for row in stated.machine.rows} == {"shoulder_position", "elbow_position"}
     assert sources(stated)["elbow.command"] == "tau2"
     assert described(tmp_path, motion, MOTORS).reading.kind.test == "inverse dynamics"
 

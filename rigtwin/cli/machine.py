@@ -64,8 +64,7 @@ def execute(parsed: argparse.Namespace) -> int:
     ]
     effects = [effect for effect in machine.effects() if effect.searched]
     for name, component in machine.components.items():
-        # Tolerances in ticks have no unit of their own to print beside a value.
-        held = [t for t in machine.tolerances if t.group == name and not t.ticks]
+        held = [t for t in machine.tolerances if t.group == name and t.is_declared]
         values = ", ".join(
             f"{t.parameter} {parameter_of(machine.plant, name, t.parameter):g} ± "
             + (f"{100 * t.half_width:g} %" if t.relative else f"{t.half_width:g}")

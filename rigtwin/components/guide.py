@@ -59,6 +59,11 @@ class Guide(NamedTuple):
     T_n is the Chebyshev polynomial of degree n, and ξ = (x − curve_middle)/curve_half_range, held
     within ±1: beyond the range in which a curve was identified, its force stays as at the end.
 
+    Where the motion is given, dry friction follows the motion of `reversal_lead` later: its sign is
+    that of v + reversal_lead·v', and its spring stretches by x + reversal_lead·v. MuJoCo's friction
+    constraint with the reference acceleration −v / T reverses early by T, which is 9.5 ms by default
+    (docs/theory.md, "Reversal of dry friction").
+
     s(x) is how far x lies beyond `stop_high`, or below `stop_low` (negative), and 0 between them.
 
     The transmitted force is what reaches the guide from the body and the guide's own spring where
@@ -93,6 +98,7 @@ class Guide(NamedTuple):
     curve_5: Annotated[float, Quantity("N", -1e7, 1e7, NONE)] = 0.0
     curve_middle: Annotated[float, Quantity("m", -1e3, 1e3, NONE)] = 0.0
     curve_half_range: Annotated[float, Quantity("m", 1e-9, 1e3, NONE)] = 1.0
+    reversal_lead: Annotated[float, Quantity("s", -0.1, 0.1, NONE)] = 0.0
     stop_stiffness: Annotated[float, Quantity("N/m", 0.0, 1e12, NONE)] = 0.0
     stop_damping: Annotated[float, Quantity("Ns/m", 0.0, 1e9, NONE)] = 0.0
     stop_low: Annotated[float, Quantity("m", -1e3, 1e3, NONE)] = -1.0
@@ -106,6 +112,7 @@ SHAPES = (
     "stribeck_exponent",
     "cogging_pitch",
     "cogging_phase",
+    "reversal_lead",
     *FRAME,
     *STOPS,
 )
@@ -115,6 +122,11 @@ SHAPES = (
 def acts(guide: Guide) -> bool:
     """Return whether any parameter of a guide exerts a force."""
     return any(value for name, value in guide._asdict().items() if name not in SHAPES)
+
+
+def rubs(guide: Guide) -> bool:
+    """Return whether a guide has dry friction, whose sign follows the motion's."""
+    return bool(guide.coulomb or guide.stribeck or guide.asymmetry or guide.load_coefficient)
 
 
 def resists(guide: Guide) -> bool:

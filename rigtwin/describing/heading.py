@@ -18,6 +18,8 @@ from rigtwin.importing.units import unit_of
 
 GREEK = {"θ": "theta", "τ": "tau", "φ": "phi", "ω": "omega", "ϕ": "phi"}
 """Letters that columns are named by."""
+SHORT = {"th": "theta", "ph": "phi"}
+"""Short forms of those letters' names."""
 PRECEDENCE = (
     JointQuantity.OTHER,
     JointQuantity.VOLTAGE,
@@ -27,6 +29,12 @@ PRECEDENCE = (
     JointQuantity.POSITION,
 )
 """Order in which the words of quantities decide: a "position error" is no position."""
+
+SAID_BY_UNITS = (JointQuantity.CURRENT, JointQuantity.FORCE, JointQuantity.VELOCITY)
+"""Quantities that a unit states for certain. A velocity "in degrees" may be one in degrees a
+second."""
+SAID_BY_WORDS = (*SAID_BY_UNITS, JointQuantity.POSITION)
+"""Quantities that a unit may state instead of a word."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +73,7 @@ def split_words(name: str) -> tuple[str, ...]:
     # A capital N at the end is the unit: shaker_N has the words shaker, newton.
     name = re.sub(r"(?<=[_\s(\[])N(?=[)\]]?$)", "newton", name)
     name = re.sub(r"([a-z])([A-Z])", r"\1 \2", name)
-    return tuple(re.findall(r"[a-z]+|\d+", name.lower()))
+    return tuple(SHORT.get(word, word) for word in re.findall(r"[a-z]+|\d+", name.lower()))
 
 
 def read_words(words: tuple[str, ...], unit: str) -> Meaning:
@@ -78,6 +86,9 @@ def read_words(words: tuple[str, ...], unit: str) -> Meaning:
     unit
         Unit that the file states for the column; empty if it states none.
     """
+    # The current in a motor's q axis is often called i_q.
+    if "i" in words and "q" in words:
+        words = ("iq", *(word for word in words if word not in ("i", "q")))
     commanded = any(word in COMMANDED for word in words)
     quantity = None
     # q_dot and theta dot are derivatives, although q and theta are positions.
@@ -89,6 +100,10 @@ def read_words(words: tuple[str, ...], unit: str) -> Meaning:
         quantity = next((q for q in PRECEDENCE if WORDS[q] & _without_adjective(words)), None)
     if quantity is None:
         quantity = _quantity_by_unit(words, unit)
+    # A unit says more than a word: a "moment" in A is a current, and "phi" in rad/s a velocity.
+    elif unit and quantity in SAID_BY_WORDS:
+        stated = _quantity_by_unit((), unit)
+        quantity = stated if stated in SAID_BY_UNITS else quantity
     known = COMMANDED | MEASURED | frozenset(UNIT_WORDS) | {"dot", "ddot"}
     known |= frozenset().union(*WORDS.values())
     unknown = tuple(word for word in words if word not in known and not word.isdigit())

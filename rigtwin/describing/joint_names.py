@@ -102,15 +102,19 @@ def list_aliases(mechanism: Mechanism) -> list[Alias]:
     return list(aliases.values())
 
 
-def spell_out(words: tuple[str, ...], aliases: Sequence[Alias]) -> tuple[str, ...]:
-    """Return the words of a heading with abbreviated words of joints' names in full.
+def read_abbreviations(
+    headings: Sequence[tuple[str, ...]], aliases: Sequence[Alias]
+) -> dict[str, str]:
+    """Return the abbreviated words of joints' names in the headings of a log → words in full.
 
     An abbreviation is the beginning of one word of the names alone, as "susp" is of suspension.
+    One of two letters could be anything, so that several joints must be abbreviated like that: "az"
+    and "el" of azimuth and elevation.
 
     Parameters
     ----------
-    words
-        Words of the heading.
+    headings
+        Words of every heading.
     aliases
         Names of the joints.
     """
@@ -118,14 +122,16 @@ def spell_out(words: tuple[str, ...], aliases: Sequence[Alias]) -> tuple[str, ..
     known = (
         names | QUANTITY_WORDS | MEASURED | COMMANDED | COORDINATES | TIME | frozenset(UNIT_WORDS)
     )
-
-    def full(word: str) -> str:
-        if len(word) < SHORTEST_WORD or word.isdigit() or word in known:
-            return word
-        longer = [name for name in names if name.startswith(word)]
-        return longer[0] if len(longer) == 1 else word
-
-    return tuple(full(word) for word in words)
+    long: dict[str, str] = {}
+    short: dict[str, str] = {}
+    for word in dict.fromkeys(word for words in headings for word in words):
+        if len(word) < SHORTEST_WORD - 1 or word.isdigit() or word in known:
+            continue
+        complete = [name for name in names if name.startswith(word)]
+        if len(complete) == 1:
+            (long if len(word) >= SHORTEST_WORD else short)[word] = complete[0]
+    joints = {alias.joint for alias in aliases if set(alias.words) & {*short.values()}}
+    return long | short if len(joints) > 1 else long
 
 
 def _distinctive_words(joints: Sequence[str], aliases: Sequence[Alias]) -> list[tuple[str, str]]:

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from rigtwin.describing.heading import read_words, split_words, stated_unit
-from rigtwin.describing.joint_names import QUANTITY_WORDS, Alias, list_aliases, spell_out
+from rigtwin.describing.joint_names import QUANTITY_WORDS, Alias, list_aliases, read_abbreviations
 from rigtwin.describing.match import NUMBERED, REMAINING, UNNAMED, Match
 from rigtwin.describing.quantity import ANGULAR, AXIAL, COORDINATES, MEASURED, JointQuantity
 from rigtwin.describing.question import enumerate_names
@@ -44,10 +44,11 @@ def match_columns(
     matches: list[Match] = []
     unused: dict[str, str] = {}
     numbered: dict[str, tuple[str, ...]] = {}
-    for column in _distinct(columns):
-        if column in skipped:
-            continue
-        words, unit = spell_out(split_words(column), aliases), columns.units.get(column, "")
+    headings = {name: split_words(name) for name in _distinct(columns) if name not in skipped}
+    abbreviated = read_abbreviations(list(headings.values()), aliases)
+    for column, heading in headings.items():
+        words = tuple(abbreviated.get(word, word) for word in heading)
+        unit = columns.units.get(column, "")
         named = _by_alias(column, words, unit, aliases)
         if len(named) == 1:
             matches += named

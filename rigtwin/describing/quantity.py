@@ -32,7 +32,7 @@ def _words(text: str) -> frozenset[str]:
 
 WORDS: dict[JointQuantity, frozenset[str]] = {
     JointQuantity.POSITION: _words(
-        "pos position positions angle angles ang q qpos theta phi encoder enc disp displacement "
+        "pos position positions angle angles ang q qpos theta phi alpha beta psi encoder enc disp displacement "
         "travel coordinate jointpos rotation location place qm winkel weg"
     ),
     JointQuantity.VELOCITY: _words(
@@ -43,8 +43,8 @@ WORDS: dict[JointQuantity, frozenset[str]] = {
         "tau torque torques force forces effort efforts trq tq frc moment loadcell "
         "fx fy fz mx my mz kraft drehmoment"
     ),
-    JointQuantity.CURRENT: _words("current currents cur curr amps amperage strom courant"),
-    JointQuantity.VOLTAGE: _words("voltage volt volts"),
+    JointQuantity.CURRENT: _words("current currents cur curr amps amperage iq im strom courant"),
+    JointQuantity.VOLTAGE: _words("voltage volt volts vm"),
     JointQuantity.OTHER: _words(
         "acc accel acceleration ddq qdd qacc temp temperature error err status mode flag index "
         "episode frame task imu gyro quat id seq count"
@@ -53,13 +53,18 @@ WORDS: dict[JointQuantity, frozenset[str]] = {
 """Quantity → words that name it."""
 COMMANDED = _words(
     "cmd command commands commanded target targets goal goals desired des ref reference setpoint "
-    "set qref qdes qcmd action actions demand demanded ctrl control u sp input "
+    "set qref qdes qcmd action actions demand demanded ctrl control u sp input joy joystick "
     "soll sollwert consigne"
 )
 """Words that say that a column was commanded and not measured."""
+REFERENCES = _words(
+    "target targets goal goals desired des ref reference setpoint set qref qdes sp soll sollwert "
+    "consigne"
+)
+"""Those of them that name the setpoint of a controller, and not what an actuator is given."""
 MEASURED = _words(
     "measured meas actual act present read reading feedback fb observation obs state real data "
-    "raw value states joint joints motor actuator servo axis link j m sensor of the "
+    "raw value states joint joints motor actuator servo drive axis link j m sensor of the "
     "controller ist istwert"
 )
 """Words that say nothing more."""
@@ -90,9 +95,9 @@ UNIT_WORDS = {
 AXIAL = _words("fx fy fz mx my mz")
 """Forces and moments along an axis. Without the name of a joint they may be those of another
 sensor, as mx is of a magnetometer."""
-COORDINATES = _words("x y z")
+COORDINATES = _words("x y z xc")
 """Names of a position along a line."""
-ANGULAR = _words("theta phi angle angles ang omega rpm")
+ANGULAR = _words("theta phi alpha beta psi angle angles ang omega rpm")
 """Words for quantities of a hinge."""
 TESTS = _words("episode ep run trial rollout traj trajectory repetition rep experiment")
 """Words that name the number of a test."""

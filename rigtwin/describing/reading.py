@@ -29,6 +29,7 @@ from rigtwin.describing.matching import match_columns
 from rigtwin.describing.position_signals import ask_positions, position_signals
 from rigtwin.describing.quantity import JointQuantity
 from rigtwin.describing.question import Question, enumerate_names, option
+from rigtwin.describing.references import withdraw_references
 from rigtwin.describing.replay_kind import ReplayKind, choose_kind, free_swing
 from rigtwin.describing.resting import note_resting
 from rigtwin.describing.schedule_signals import ScheduleColumn, schedule_columns
@@ -175,6 +176,7 @@ def _choose_movers(
 ) -> tuple[ReplayKind, list[LogSignal]]:
     """The kind of the test, and the forces or commands that it needs."""
     joints = list(positions)
+    withdraw_references(log, positions)
     offer_remaining_command(log, positions)
     forces, still = force_signals(log, positions)
     by_servos = len(forces) == len(joints) and come_from_servos(log, positions, forces)

@@ -9,6 +9,7 @@ from rigtwin.describing.heading import read_words, split_words
 from rigtwin.describing.quantity import JointQuantity
 from rigtwin.describing.question import ask, enumerate_names, option
 from rigtwin.describing.slots import Slots
+from rigtwin.description.coupling import are_coupled
 from rigtwin.description.implied import FORCES, INVERSE, POSITIONS, SERVOS, TESTS
 from rigtwin.description.joint_elements import actuator_on
 from rigtwin.description.mechanism import Mechanism
@@ -100,6 +101,11 @@ def choose_kind(
             return ReplayKind(FORCES, "the force is 0 throughout: the joints swing freely")
         if any(mechanism.falls_with_speed(actuator_on(mechanism, j) or "") for j in pushed):
             return ReplayKind(FORCES, "the actuators' commands are in the log")
+        # Small errors of the forces make the predicted motion of an arm run away.
+        if placed and len(pushed) == len(joints) > 1 and are_coupled(mechanism, joints):
+            return ReplayKind(
+                INVERSE, "the actuators take forces, and those of every joint are in the log"
+            )
         return ReplayKind(FORCES, "the actuators take forces, and those are in the log")
     raise _question(mechanism, joints, measured, commanded)
 
@@ -163,7 +169,8 @@ def command_quantities(mechanism: Mechanism, joint: str) -> tuple[JointQuantity,
     if mechanism.is_dc_motor(actuator):
         return JointQuantity.COMMAND, JointQuantity.VOLTAGE
     if mechanism.falls_with_speed(actuator):
-        return JointQuantity.VELOCITY_COMMAND, JointQuantity.COMMAND
+        # Back EMF makes a force fall with speed, so the control may be a voltage.
+        return JointQuantity.VELOCITY_COMMAND, JointQuantity.COMMAND, JointQuantity.VOLTAGE
     # The control of a model's motor may be a current, with its torque constant as the gear.
     return JointQuantity.FORCE_COMMAND, JointQuantity.COMMAND, JointQuantity.CURRENT_COMMAND
 

@@ -55,6 +55,15 @@ class Slots:
         """
         self._matches.setdefault((match.joint, match.quantity), []).append(match)
 
+    def withdraw(self, column: str) -> None:
+        """Offer a matched column for no quantity any more."""
+        for slot, matches in list(self._matches.items()):
+            remaining = [match for match in matches if match.column != column]
+            if remaining:
+                self._matches[slot] = remaining
+            else:
+                del self._matches[slot]
+
     def has(self, joint: str, quantity: JointQuantity) -> bool:
         """Whether the log offers a quantity of a joint."""
         stated = self._stated.slots.get((joint, quantity))

@@ -6,10 +6,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from rigtwin.components.plant import P, Plant, parameter_of, with_parameters
+from rigtwin.components.guide import Guide, rubs
+from rigtwin.components.plant import P, Plant, parameter_of, select, with_parameters
 
 MECHANICAL = ("mass", "stiffness", "constant", "coulomb", "viscous")
 """Parameters that change the motion itself, and not only its measurement."""
+REVERSAL = "reversal_lead"
+"""Parameter of a guide: the time by which dry friction reverses before the motion."""
 
 
 @dataclass(frozen=True)
@@ -31,6 +34,8 @@ class Tolerance:
         Whether the half width is in ticks of the recording.
     longest
         Upper bound of a half width in ticks, s.
+    is_declared
+        Whether the description declares it. Other tolerances belong to every machine of its kind.
     """
 
     group: str
@@ -39,6 +44,7 @@ class Tolerance:
     relative: bool = False
     ticks: bool = False
     longest: float = math.inf
+    is_declared: bool = True
 
     def width(self, plant: Plant, period: float = 1.0) -> float:
         """Return the half width in the parameter's unit.
@@ -59,6 +65,16 @@ class Tolerance:
         """Return a plant with the parameter increased by an amount, in the parameter's unit."""
         value = parameter_of(plant, self.group, self.parameter) + amount
         return with_parameters(plant, self.group, {self.parameter: value})
+
+    def is_idle(self, plant: Plant) -> bool:
+        """Return whether the parameter cannot change the prediction of a plant.
+
+        The sign of friction matters only where there is friction.
+        """
+        if self.parameter != REVERSAL:
+            return False
+        (component,) = select(plant, [self.group])
+        return isinstance(component, Guide) and not rubs(component)
 
     @property
     def mechanical(self) -> bool:

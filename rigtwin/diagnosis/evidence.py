@@ -411,6 +411,9 @@ class Evidence:
         for tolerance in self.machine.tolerances:
             # A sensor's tolerance acts linearly, for which one side suffices.
             width = self.width(tolerance)
+            if tolerance.is_idle(plant):
+                columns.append(np.zeros(sum(2 * lines.weight.size for lines in self.lines)))
+                continue
             after, scale = self.predict(tolerance.shift(plant, width)), 1.0
             start = before
             if tolerance.mechanical and width > 0.0:

@@ -141,6 +141,7 @@ class HypothesisSearch:
         self.fine = Fitter(searched)
         self._scorer = Scorer(self.fine)
         self._extended: set[frozenset[Effect]] = set()
+        self._reduced: set[frozenset[Effect]] = set()
         self._started: set[Start] = set()
         self._linearised: Linearised | None = None
         self.screened: list[Screened] = []
@@ -427,6 +428,23 @@ class HypothesisSearch:
                 ]
             )
         self._keep(fits)
+        self._reduce_held_back()
+
+    def _reduce_held_back(self) -> None:
+        """Leave effects out of the closest hypothesis where only its values hold it back.
+
+        An effect that stands in for another one keeps hardly any value beside it. The hypothesis
+        then pays for that value far more than the effect itself is worth.
+        """
+        posterior = self.posterior
+        closest = min(self.pool.values(), key=lambda scored: scored.fit.misfit)
+        effects = closest.fit.effects
+        if frozenset(effects) in self._reduced or not 1 < len(effects) <= SHORT:
+            return
+        prices = sum(posterior.prices.price_effect(effect) for effect in effects)
+        if posterior.loss(closest) + prices < posterior.ranking[0].cost < posterior.cost(closest):
+            self._reduced.add(frozenset(effects))
+            self._keep(self._refine(self._leave_out(closest.fit)))
 
     def _vary(self, leader: Fit, count: int) -> None:
         """Fit a hypothesis without each effect, and with each replaced by `count` others."""

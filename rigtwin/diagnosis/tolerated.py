@@ -45,8 +45,7 @@ def find_used_up(evidence: Evidence, fit: Fit, named: Sequence[Effect]) -> tuple
     amounts = space.estimate_tolerances(evidence.residual(plant))
     tolerated = []
     for tolerance, amount in zip(evidence.machine.tolerances, amounts, strict=True):
-        # The time of sampling within a tick has a tolerance that nobody declared.
-        if tolerance.ticks or abs(amount) < USED_UP:
+        if not tolerance.is_declared or abs(amount) < USED_UP:
             continue
         nominal = parameter_of(evidence.plant, tolerance.group, tolerance.parameter)
         width = evidence.width(tolerance)

@@ -41,9 +41,11 @@ def resist(guide_step: GuideStep, motion: Array, out: Array) -> None:
         x, v = motion[0, tick], motion[1, tick]
         # Load-dependent friction sees inertia, gravity and spring, but not friction itself.
         transmitted = out[tick] + position_force(guide, x, guide_step.rest)
-        forward, backward = dry_limits(guide_step.dry_friction, v, transmitted)
+        lead = guide.reversal_lead
+        speed = v + lead * motion[2, tick]
+        forward, backward = dry_limits(guide_step.dry_friction, speed, transmitted)
         half = 0.5 * guide.backlash
-        dry, by = slide(x - slider, half, guide_step.spring, forward, backward)
+        dry, by = slide(x + lead * v - slider, half, guide_step.spring, forward, backward)
         slider += by
         viscous += guide_step.share * (damping(guide, v) * v - viscous)
         out[tick] = transmitted + dry + viscous + quick_damping(guide, x, v) * v
@@ -60,8 +62,9 @@ def resist_at_once(guide_step: GuideStep, motion: Array, out: Array) -> None:
     for tick in range(motion.shape[1]):
         x, v = motion[0, tick], motion[1, tick]
         transmitted = out[tick] + position_force(guide, x, guide_step.rest)
-        forward, backward = dry_limits(guide_step.dry_friction, v, transmitted)
-        dry = forward if v > 0.0 else (-backward if v < 0.0 else 0.0)
+        speed = v + guide.reversal_lead * motion[2, tick]
+        forward, backward = dry_limits(guide_step.dry_friction, speed, transmitted)
+        dry = forward if speed > 0.0 else (-backward if speed < 0.0 else 0.0)
         viscous += guide_step.share * (damping(guide, v) * v - viscous)
         out[tick] = transmitted + dry + viscous + quick_damping(guide, x, v) * v
 
