@@ -60,9 +60,8 @@ class Guide(NamedTuple):
     within ±1: beyond the range in which a curve was identified, its force stays as at the end.
 
     Where the motion is given, dry friction follows the motion of `reversal_lead` later: its sign is
-    that of v + reversal_lead·v', and its spring stretches by x + reversal_lead·v. MuJoCo's friction
-    constraint with the reference acceleration −v / T reverses early by T, which is 9.5 ms by default
-    (docs/theory.md, "Reversal of dry friction").
+    that of v + reversal_lead·v', and its spring stretches by x + reversal_lead·v. MuJoCo's soft
+    friction reverses early, by 9.5 ms by default (docs/theory.md, "Dry friction").
 
     s(x) is how far x lies beyond `stop_high`, or below `stop_low` (negative), and 0 between them.
 

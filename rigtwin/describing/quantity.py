@@ -32,8 +32,8 @@ def _words(text: str) -> frozenset[str]:
 
 WORDS: dict[JointQuantity, frozenset[str]] = {
     JointQuantity.POSITION: _words(
-        "pos position positions angle angles ang q qpos theta phi alpha beta psi encoder enc disp displacement "
-        "travel coordinate jointpos rotation location place qm winkel weg"
+        "pos position positions angle angles ang q qpos theta phi alpha beta psi encoder enc disp "
+        "displacement travel coordinate jointpos rotation location place qm winkel weg"
     ),
     JointQuantity.VELOCITY: _words(
         "vel velocity velocities speed dq qd qvel qdot omega rate dtheta thetadot dphi rpm "
