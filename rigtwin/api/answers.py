@@ -52,7 +52,8 @@ def diagnose(
     ----------
     recordings
         Recording, or several of one machine that are explained jointly, or their paths. If
-        `machine` is a model, these are logs of other programs.
+        `machine` is a model, these are logs of other programs: their paths, pandas DataFrames, or
+        dictionaries of name → array.
     machine
         Machine the recordings belong to, or its name, or the path of its description. Defaults to
         the one named in the first recording. A model (MJCF or URDF) is described from the first

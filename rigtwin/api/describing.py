@@ -5,17 +5,20 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from rigtwin.api.recordings import Origin, Recording, with_machine
 from rigtwin.describing.described import Described, describe_log
 from rigtwin.description.bare import MODELS
 from rigtwin.description.menagerie import find_robot, is_robot
 from rigtwin.errors import RigtwinError
+from rigtwin.importing.log_source import LogSource
 from rigtwin.recording import reader
 
-Log = str | Path | Sequence[str | Path]
-"""Log of another program: a file, or several whose columns are joined. A text "a.csv+b.csv" names
-two files."""
+Log = str | Path | Sequence[str | Path] | Any
+"""Log of another program: a file, or several whose columns are joined; or a pandas DataFrame, an
+Arrow table, a numpy array with named fields, or a dictionary of name → array. A text "a.csv+b.csv"
+names two files."""
 SEPARATOR = "+"
 """Separator of a log's files in one text."""
 
@@ -38,7 +41,8 @@ def describe(
     model
         File of the mechanics, MJCF or URDF.
     log
-        CSV, JSON, MATLAB or parquet file, or several whose columns are joined row by row.
+        CSV, JSON, MATLAB or parquet file, or several whose columns are joined row by row; or a
+        pandas DataFrame or a dictionary of name → array.
     columns
         Statements about the log that override its reading. "elbow.position" → a column with or
         without sign and unit ("-q2 [deg]"), a formula of columns, or "none"; ``"*.position"`` → a
@@ -72,7 +76,7 @@ def describe(
         model = find_robot(str(model))
     if Path(model).suffix.lower() not in MODELS:
         raise RigtwinError(f"model {model}: expected a name that ends in {', '.join(MODELS)}")
-    described = describe_log(Path(model), log_files(log), columns or {}, test)
+    described = describe_log(Path(model), log_source(log), columns or {}, test)
     if out is not None:
         described.write(out)
     return described
@@ -117,13 +121,13 @@ def _is_recording(log: Log | reader.RecordedTest) -> bool:
         return False
 
 
-def log_files(log: Log | reader.RecordedTest) -> tuple[Path, ...]:
-    """Return the files of a log.
+def log_source(log: Log | reader.RecordedTest) -> LogSource:
+    """Return where a log comes from.
 
     Parameters
     ----------
     log
-        A file, several files, or several in one text: "a.csv+b.csv".
+        A file, several files, or several in one text: "a.csv+b.csv"; or a table in memory.
 
     Raises
     ------
@@ -135,15 +139,17 @@ def log_files(log: Log | reader.RecordedTest) -> tuple[Path, ...]:
             f"{log.path}: it is a recording already; expected a log beside a model, or a "
             "description of its machine"
         )
+    if isinstance(log, list | tuple):
+        return LogSource(tuple(Path(file) for file in log))
     if not isinstance(log, str | Path):
-        return tuple(Path(file) for file in log)
+        return LogSource.of_table(log)
     path = Path(log)
     # A file whose own name holds the separator comes first.
     if SEPARATOR in str(log) and not path.exists():
         parts = tuple(Path(file) for file in str(log).split(SEPARATOR))
         if all(part.is_file() for part in parts):
-            return parts
-    return (path,)
+            return LogSource(parts)
+    return LogSource((path,))
 
 
 def record_logs(described: Described, logs: Sequence[Log | reader.RecordedTest]) -> list[Recording]:
@@ -156,10 +162,10 @@ def record_logs(described: Described, logs: Sequence[Log | reader.RecordedTest])
     logs
         Logs with the same columns.
     """
-    return [test for log in logs for test in _record_log(described, log_files(log))]
+    return [test for log in logs for test in _record_log(described, log_source(log))]
 
 
-def _record_log(described: Described, log: tuple[Path, ...]) -> list[Recording]:
+def _record_log(described: Described, log: LogSource) -> list[Recording]:
     """Return all tests of one log as recordings."""
     return [
         replace(with_machine(test, described.machine), origin=Origin(described, log, number))

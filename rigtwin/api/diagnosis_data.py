@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from rigtwin.api.describing import describe, needs_description, record_logs
 from rigtwin.api.machines import described_machine
@@ -13,8 +14,9 @@ from rigtwin.description.machine import Machine
 from rigtwin.errors import RigtwinError
 from rigtwin.recording import reader
 
-Recorded = reader.RecordedTest | str | Path
-"""A recording, or the path of one."""
+Recorded = reader.RecordedTest | str | Path | Any
+"""A recording, the path of one, or a log in memory beside a model: a pandas DataFrame, an Arrow
+table, a numpy array with named fields, or a dictionary of name → array."""
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Machine
 from rigtwin.errors import RigtwinError
 from rigtwin.files import forbid_overwriting
+from rigtwin.importing.log_source import LogSource
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import export, reader
 
@@ -30,13 +31,13 @@ class Origin:
     described
         Description by which the log was read.
     log
-        Files of the log, whose columns are joined.
+        Where the log comes from.
     test
         Number of the test among those of the log, from 0 on.
     """
 
     described: Described
-    log: tuple[Path, ...]
+    log: LogSource
     test: int
 
 

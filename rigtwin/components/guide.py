@@ -59,9 +59,14 @@ class Guide(NamedTuple):
     T_n is the Chebyshev polynomial of degree n, and ξ = (x − curve_middle)/curve_half_range, held
     within ±1: beyond the range in which a curve was identified, its force stays as at the end.
 
-    Where the motion is given, dry friction follows the motion of `reversal_lead` later: its sign is
-    that of v + reversal_lead·v', and its spring stretches by x + reversal_lead·v. MuJoCo's soft
-    friction reverses early, by 9.5 ms by default (docs/theory.md, "Dry friction").
+    Where the motion is given, F_dry may be replaced by the friction that MuJoCo simulates, with
+    F_max the limit of |F_dry|:
+
+        F_soft = (v + soft_time·v') / soft_speed, held within ± F_max
+        F      = F_dry + softness·(F_soft − F_dry)
+
+    Its sign is that of the motion to come, so that it reverses early (docs/theory.md, "Dry
+    friction").
 
     s(x) is how far x lies beyond `stop_high`, or below `stop_low` (negative), and 0 between them.
 
@@ -97,7 +102,9 @@ class Guide(NamedTuple):
     curve_5: Annotated[float, Quantity("N", -1e7, 1e7, NONE)] = 0.0
     curve_middle: Annotated[float, Quantity("m", -1e3, 1e3, NONE)] = 0.0
     curve_half_range: Annotated[float, Quantity("m", 1e-9, 1e3, NONE)] = 1.0
-    reversal_lead: Annotated[float, Quantity("s", -0.1, 0.1, NONE)] = 0.0
+    softness: Annotated[float, Quantity("1", -2.0, 2.0, NONE)] = 0.0
+    soft_time: Annotated[float, Quantity("s", 0.0, 10.0, MJCF)] = 0.0
+    soft_speed: Annotated[float, Quantity("m/s/N", 0.0, 1e9, MJCF)] = 0.0
     stop_stiffness: Annotated[float, Quantity("N/m", 0.0, 1e12, NONE)] = 0.0
     stop_damping: Annotated[float, Quantity("Ns/m", 0.0, 1e9, NONE)] = 0.0
     stop_low: Annotated[float, Quantity("m", -1e3, 1e3, NONE)] = -1.0
@@ -111,7 +118,9 @@ SHAPES = (
     "stribeck_exponent",
     "cogging_pitch",
     "cogging_phase",
-    "reversal_lead",
+    "softness",
+    "soft_time",
+    "soft_speed",
     *FRAME,
     *STOPS,
 )
@@ -124,8 +133,10 @@ def acts(guide: Guide) -> bool:
 
 
 def rubs(guide: Guide) -> bool:
-    """Return whether a guide has dry friction, whose sign follows the motion's."""
-    return bool(guide.coulomb or guide.stribeck or guide.asymmetry or guide.load_coefficient)
+    """Return whether a guide has dry friction whose soft form is known."""
+    return guide.soft_speed > 0.0 and bool(
+        guide.coulomb or guide.stribeck or guide.asymmetry or guide.load_coefficient
+    )
 
 
 def resists(guide: Guide) -> bool:

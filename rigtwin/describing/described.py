@@ -23,6 +23,7 @@ from rigtwin.files import atomic_write, forbid_overwriting
 from rigtwin.importing.channels import Imported
 from rigtwin.importing.columns import Columns
 from rigtwin.importing.convert import read_columns, read_tests
+from rigtwin.importing.log_source import LogSource
 from rigtwin.importing.map_file import parse
 from rigtwin.importing.mapping import Map
 from rigtwin.numerics.arrays import Array
@@ -43,7 +44,7 @@ class Described:
     reading
         Conclusions from the log.
     log
-        Files of the log, whose columns are joined.
+        Where the log comes from.
     description
         The description, TOML.
     mapping
@@ -58,7 +59,7 @@ class Described:
 
     machine: Machine
     reading: Reading
-    log: tuple[Path, ...]
+    log: LogSource
     description: str = field(repr=False)
     mapping: str = field(repr=False)
     rows: tuple[Sequence[str], ...] = field(repr=False)
@@ -81,14 +82,14 @@ class Described:
                 lines.append(f"{signal.key} from {signal.source}: {'; '.join(remarks)}")
         return (*lines, *self.reading.notes)
 
-    def record(self, log: Sequence[Path] = ()) -> RecordedTest:
+    def record(self, log: LogSource | Sequence[Path] = ()) -> RecordedTest:
         """Return a log of one test as a recording of the machine.
 
         Parameters
         ----------
         log
-            Files of another log with the same columns, joined. Defaults to the log that
-            the machine was described from.
+            Another log with the same columns, or its files, which are joined. Defaults to the log
+            that the machine was described from.
 
         Raises
         ------
@@ -98,11 +99,16 @@ class Described:
         """
         first, *others = self.records(log)
         if others:
-            files = " + ".join(path.name for path in tuple(log) or self.log)
-            raise RigtwinError(f"{files}: it holds {1 + len(others)} tests; expected one")
+            label = self._source(log).label
+            raise RigtwinError(f"{label}: it holds {1 + len(others)} tests; expected one")
         return first
 
-    def records(self, log: Sequence[Path] = ()) -> tuple[RecordedTest, ...]:
+    def _source(self, log: LogSource | Sequence[Path]) -> LogSource:
+        if isinstance(log, LogSource):
+            return log
+        return LogSource(tuple(log)) if log else self.log
+
+    def records(self, log: LogSource | Sequence[Path] = ()) -> tuple[RecordedTest, ...]:
         """Return the tests of a log as recordings of the machine.
 
         Parameters
@@ -115,17 +121,17 @@ class Described:
         RigtwinError
             If the log lacks a column, or holds no numbers where they are needed.
         """
-        files = tuple(log) or self.log
+        source = self._source(log)
         wanted, notes = parse(self.mapping, "map"), self.assumptions
-        if files != self.log:
-            wanted, notes = self._adapt(wanted, files)
+        if source != self.log:
+            wanted, notes = self._adapt(wanted, source)
         return tuple(
-            self._recording(files, number, imported, notes)
-            for number, imported in read_tests(files, wanted).items()
+            self._recording(source, number, imported, notes)
+            for number, imported in read_tests(source.content, wanted).items()
         )
 
     def _recording(
-        self, files: Sequence[Path], number: int | None, imported: Imported, notes: tuple[str, ...]
+        self, source: LogSource, number: int | None, imported: Imported, notes: tuple[str, ...]
     ) -> RecordedTest:
         """A test of a log; number: that of its episode, None for a log of one test."""
         columns: dict[str, dict[str, Array]] = {}
@@ -133,9 +139,9 @@ class Described:
             columns.setdefault(topic, {})[name] = values
         suffix = "" if number is None else f" episode {number}"
         return RecordedTest(
-            path=Path(f"{files[0]}{suffix}"),
+            path=Path(f"{source.path}{suffix}"),
             machine=self.machine.name,
-            experiment=" ".join(path.stem for path in files) + suffix,
+            experiment=source.title + suffix,
             period=imported.period,
             # Recordings begin at 0 s, and an uneven log was resampled to this grid.
             time=np.arange(len(imported.time)) * imported.period,
@@ -144,12 +150,12 @@ class Described:
             notes=notes,
         )
 
-    def _adapt(self, wanted: Map, log: Sequence[Path]) -> tuple[Map, tuple[str, ...]]:
+    def _adapt(self, wanted: Map, log: LogSource) -> tuple[Map, tuple[str, ...]]:
         """The map for another log, and a note if its rows are uneven in time.
 
         That log may be even or uneven in time, and hold one test or several.
         """
-        columns, clock = read_columns(log), self.reading.clock
+        columns, clock = read_columns(log.content), self.reading.clock
         wanted = replace(wanted, episode=episode_column(columns) or None)
         if not clock.column:
             return wanted, ()
@@ -184,7 +190,7 @@ class Described:
         for path in paths:
             if path.exists():
                 raise RigtwinError(f"{path} exists; choose another folder, or remove it first")
-            forbid_overwriting(path, self.machine.model, *self.log)
+            forbid_overwriting(path, self.machine.model, *self.log.files)
         model = os.path.relpath(self.machine.model, place)
         # The description was written for a model beside it. In another folder, its path is
         # relative.
@@ -218,7 +224,7 @@ def _quote(text: str) -> str:
 
 
 def describe_log(
-    model: Path, log: Sequence[Path], stated: Mapping[str, str], test: str = ""
+    model: Path, log: LogSource, stated: Mapping[str, str], test: str = ""
 ) -> Described:
     """Describe a machine from its model and a log.
 
@@ -227,7 +233,7 @@ def describe_log(
     model
         MJCF or URDF.
     log
-        Files of the log, whose columns are joined row by row.
+        Where the log comes from.
     stated
         Statements of the log's owner: "elbow.position" → "q2 [deg]", "time" → "t [ms]".
     test
@@ -241,9 +247,9 @@ def describe_log(
         If the model or the log cannot be read.
     """
     mechanism = Mechanism(model)
-    columns = read_columns(log)
+    columns = read_columns(log.content)
     episode = episode_column(columns)
-    said = " + ".join(path.name for path in log)
+    said = log.label
     try:
         # One test, as its time rises and its motion is continuous.
         sample = longest_test(columns)
@@ -262,7 +268,7 @@ def describe_log(
     return Described(
         machine=machine,
         reading=reading,
-        log=tuple(log),
+        log=log,
         description=description,
         mapping=mapping,
         rows=tuple(table_rows(mechanism, reading)),

@@ -73,7 +73,8 @@ def split_words(name: str) -> tuple[str, ...]:
     # A capital N at the end is the unit: shaker_N has the words shaker, newton.
     name = re.sub(r"(?<=[_\s(\[])N(?=[)\]]?$)", "newton", name)
     name = re.sub(r"([a-z])([A-Z])", r"\1 \2", name)
-    return tuple(SHORT.get(word, word) for word in re.findall(r"[a-z]+|\d+", name.lower()))
+    words: list[str] = re.findall(r"[a-z]+|\d+", name.lower())
+    return tuple(SHORT.get(word, word) for word in words)
 
 
 def read_words(words: tuple[str, ...], unit: str) -> Meaning:

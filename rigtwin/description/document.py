@@ -121,7 +121,7 @@ class _Reader:
             return None
         # Timing tolerances of the description have priority, so these come last.
         reader.tolerate_timing(replays)
-        reader.tolerate_reversals(replays)
+        reader.tolerate_softness(replays)
         values = {**components.values, "computer": Computer(), "mains": Mains(mains)}
         return Machine(
             name=str(about["name"]),

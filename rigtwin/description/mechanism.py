@@ -388,15 +388,24 @@ class Mechanism:
         model, number = self.model, self.number(element, name)
         if element == "tendon":
             dry, damping = model.tendon_frictionloss[number], model.tendon_damping[number]
-            stiffness = model.tendon_stiffness[number]
+            stiffness, weight = model.tendon_stiffness[number], model.tendon_invweight0[number]
+            reference, impedance = model.tendon_solref_fri[number], model.tendon_solimp_fri[number]
         else:
             at = int(model.jnt_dofadr[number])
             dry, damping = model.dof_frictionloss[at], model.dof_damping[at]
-            stiffness = model.jnt_stiffness[number]
+            stiffness, weight = model.jnt_stiffness[number], model.dof_invweight0[at]
+            reference, impedance = model.dof_solref[at], model.dof_solimp[at]
+        # The constraint asks for the acceleration −v / T within ± the friction. Its reference is a
+        # time constant and a damping ratio, or, where negative, a stiffness and a damping.
+        low, high = float(impedance[0]), float(impedance[1])
+        damped = 2.0 / (high * reference[0]) if reference[0] > 0.0 else -reference[1] / high
+        soft_time = 1.0 / float(damped) if damped > 0.0 else 0.0
         return {
             "coulomb": float(dry),
             "viscous": float(np.ravel(damping)[0]),
             "stiffness": float(np.ravel(stiffness)[0]),
+            "soft_time": soft_time,
+            "soft_speed": soft_time * (1.0 - low) / low * float(weight),
         }
 
     def body(self, name: str) -> dict[str, float]:

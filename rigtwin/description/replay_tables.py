@@ -13,7 +13,7 @@ from rigtwin.description.mechanism import Mechanism
 from rigtwin.description.mistakes import Mistakes, suggest
 from rigtwin.description.physics import Physics
 from rigtwin.description.replay import Joint, ReplayOf, Row
-from rigtwin.description.tolerance import REVERSAL, Tolerance
+from rigtwin.description.tolerance import SOFTNESS, Tolerance
 from rigtwin.errors import RigtwinError
 
 TICKS_LATE = 0.5
@@ -21,9 +21,6 @@ TICKS_LATE = 0.5
 HELD = 5e-3
 """Largest sampling delay of a force against a measured motion, s: half a tick of a controller of
 100 Hz. A log of fewer rows may come from a faster controller."""
-SOFTLY_REVERSED = 0.01
-"""Default tolerance of the time at which dry friction reverses, s. MuJoCo's soft friction reverses
-early by dmax·timeconst/2, 9.5 ms by default; presliding makes the friction of bearings late."""
 NO_JOINT = Joint("", False, 0.0, (-1.0, 1.0), (0.0, 0.0), 0.0)
 """Joint of a replay that covers a whole machine."""
 
@@ -324,17 +321,17 @@ class Replays:
                         )
                     )
 
-    def tolerate_reversals(self, replays: tuple[ReplayOf, ...]) -> None:
-        """Allow dry friction to reverse a little earlier or later than a measured motion.
+    def tolerate_softness(self, replays: tuple[ReplayOf, ...]) -> None:
+        """Allow dry friction to be soft, as MuJoCo simulates it, or sharp, as Coulomb has it.
 
-        Only along measured motions is the reversal a matter of the friction's law alone.
+        The difference matters along measured motions, where friction follows from their direction.
         """
         movers = [self._components.types[name] for replay in replays for name in replay.moved_by]
         if not movers or not all(kind in SENSED for kind in movers):
             return
         declared = {(known.group, known.parameter) for known in self._components.tolerances}
         for name, component in self._components.by_name.items():
-            if component.component_type is Guide and (name, REVERSAL) not in declared:
+            if component.component_type is Guide and (name, SOFTNESS) not in declared:
                 self._components.tolerances.append(
-                    Tolerance(name, REVERSAL, SOFTLY_REVERSED, is_declared=False)
+                    Tolerance(name, SOFTNESS, 1.0, is_declared=False)
                 )

@@ -11,8 +11,8 @@ from rigtwin.components.plant import P, Plant, parameter_of, select, with_parame
 
 MECHANICAL = ("mass", "stiffness", "constant", "coulomb", "viscous")
 """Parameters that change the motion itself, and not only its measurement."""
-REVERSAL = "reversal_lead"
-"""Parameter of a guide: the time by which dry friction reverses before the motion."""
+SOFTNESS = "softness"
+"""Parameter of a guide: how far its dry friction is the soft one that MuJoCo simulates."""
 
 
 @dataclass(frozen=True)
@@ -69,9 +69,9 @@ class Tolerance:
     def is_idle(self, plant: Plant) -> bool:
         """Return whether the parameter cannot change the prediction of a plant.
 
-        The sign of friction matters only where there is friction.
+        Friction can be soft only where there is friction.
         """
-        if self.parameter != REVERSAL:
+        if self.parameter != SOFTNESS:
             return False
         (component,) = select(plant, [self.group])
         return isinstance(component, Guide) and not rubs(component)

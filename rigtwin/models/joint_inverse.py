@@ -7,12 +7,35 @@ Nothing is integrated but the friction elements, whose state follows from the mo
 from __future__ import annotations
 
 from rigtwin.components.dry_friction import dry_limits, slide
+from rigtwin.components.guide import Guide
 from rigtwin.components.guide_force import damping, position_force, quick_damping
 from rigtwin.components.guide_step import GuideStep
 from rigtwin.components.mount import MountState, give_way
 from rigtwin.models.joint_motion import Inertia, gravity
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
+
+
+@kernel
+def soften(guide: Guide, v: float, acceleration: float, forward: float, backward: float) -> float:
+    """Return the dry friction that MuJoCo simulates, which is soft and reverses early.
+
+    Parameters
+    ----------
+    guide
+        Guide with `soft_time` T and `soft_speed` RT, with R the constraint's regularisation.
+    v, acceleration
+        Velocity and acceleration, m/s and m/s².
+    forward, backward
+        Limits of dry friction for positive and negative velocity, N.
+
+    Returns
+    -------
+    float
+        Friction (v + T·v')/(R·T) within its limits, N.
+    """
+    force = (v + guide.soft_time * acceleration) / guide.soft_speed
+    return min(max(force, -backward), forward)
 
 
 @kernel
@@ -41,12 +64,12 @@ def resist(guide_step: GuideStep, motion: Array, out: Array) -> None:
         x, v = motion[0, tick], motion[1, tick]
         # Load-dependent friction sees inertia, gravity and spring, but not friction itself.
         transmitted = out[tick] + position_force(guide, x, guide_step.rest)
-        lead = guide.reversal_lead
-        speed = v + lead * motion[2, tick]
-        forward, backward = dry_limits(guide_step.dry_friction, speed, transmitted)
+        forward, backward = dry_limits(guide_step.dry_friction, v, transmitted)
         half = 0.5 * guide.backlash
-        dry, by = slide(x + lead * v - slider, half, guide_step.spring, forward, backward)
+        dry, by = slide(x - slider, half, guide_step.spring, forward, backward)
         slider += by
+        if guide.softness != 0.0:
+            dry += guide.softness * (soften(guide, v, motion[2, tick], forward, backward) - dry)
         viscous += guide_step.share * (damping(guide, v) * v - viscous)
         out[tick] = transmitted + dry + viscous + quick_damping(guide, x, v) * v
 
@@ -62,9 +85,10 @@ def resist_at_once(guide_step: GuideStep, motion: Array, out: Array) -> None:
     for tick in range(motion.shape[1]):
         x, v = motion[0, tick], motion[1, tick]
         transmitted = out[tick] + position_force(guide, x, guide_step.rest)
-        speed = v + guide.reversal_lead * motion[2, tick]
-        forward, backward = dry_limits(guide_step.dry_friction, speed, transmitted)
-        dry = forward if speed > 0.0 else (-backward if speed < 0.0 else 0.0)
+        forward, backward = dry_limits(guide_step.dry_friction, v, transmitted)
+        dry = forward if v > 0.0 else (-backward if v < 0.0 else 0.0)
+        if guide.softness != 0.0:
+            dry += guide.softness * (soften(guide, v, motion[2, tick], forward, backward) - dry)
         viscous += guide_step.share * (damping(guide, v) * v - viscous)
         out[tick] = transmitted + dry + viscous + quick_damping(guide, x, v) * v
 
