@@ -31,7 +31,7 @@ class Origin:
     described
         Description by which the log was read.
     log
-        Where the log comes from.
+        Source of the log, files or a table in memory.
     test
         Number of the test among those of the log, from 0 on.
     """

@@ -44,7 +44,7 @@ class Described:
     reading
         Conclusions from the log.
     log
-        Where the log comes from.
+        Source of the log, files or a table in memory.
     description
         The description, TOML.
     mapping
@@ -233,7 +233,7 @@ def describe_log(
     model
         MJCF or URDF.
     log
-        Where the log comes from.
+        Source of the log, files or a table in memory.
     stated
         Statements of the log's owner: "elbow.position" → "q2 [deg]", "time" → "t [ms]".
     test

@@ -408,13 +408,13 @@ class HypothesisSearch:
         fits = [weighted.scored.fit for weighted in ranking if math.isfinite(weighted.cost)]
         return [fit for fit in fits if fit.effects]
 
-    def _extend(self, leader: Fit) -> None:
-        """Fit a hypothesis with one more effect."""
+    def _extend(self, leader: Fit, count: int = 0) -> None:
+        """Fit a hypothesis with one more effect, each of `count` others in turn."""
         self._extended.add(frozenset(leader.effects))
         price = 2.0 * self.posterior.prices.ordinary
         proposals = choose_distinct(
             propose_additions(self.coarse, leader, self._searched, price, self.threads),
-            self.thresholds.additions,
+            count or self.thresholds.additions,
         )
         fits = self.threads.map(
             lambda proposal: self.coarse.refine(proposal.effects, proposal.values, proposal.space),
@@ -498,10 +498,26 @@ class HypothesisSearch:
             reduced.add(best)
             self._vary(self.posterior.best.fit, COMPARED)
             self._merge(self.posterior.best.fit)
+            self._extend_remainder(self.posterior.best.fit)
             # An effect that took the place of another may make a third one superfluous.
             rivals = [fit for fit in self._ranked_fits()[:RIVALS] if fit.effects not in reduced]
             reduced.update(fit.effects for fit in rivals)
             self._keep(self._refine([start for fit in rivals for start in self._leave_out(fit)]))
+
+    def _extend_remainder(self, leader: Fit) -> None:
+        """Look for other effects that explain what the weakest effect of a hypothesis explains.
+
+        They may resemble that effect too little to be tried in its place.
+        """
+        remainders = [
+            scored.fit
+            for effects, scored in self.pool.items()
+            if effects < frozenset(leader.effects) and len(effects) == len(leader.effects) - 1
+        ]
+        closest = min(remainders, key=lambda fit: fit.misfit, default=None)
+        if closest is not None and frozenset(closest.effects) not in self._extended:
+            # A linear estimate of what each of them explains does not tell the best one for certain.
+            self._extend(closest, 2 * self.thresholds.additions)
 
     def _merge(self, leader: Fit) -> None:
         """Fit a hypothesis with one effect in the place of each two."""
