@@ -15,7 +15,7 @@ class Computer(NamedTuple):
     missed_ticks: Annotated[
         float, Quantity("1", 0.0, 0.5, "0: real-time computer; a share of all ticks")
     ] = 0.0
-    delay: Annotated[float, Quantity("s", 0.0, 0.02, "0: no computation delay, assumed")] = 0.0
+    delay: Annotated[float, Quantity("s", 0.0, 1.0, "0: no computation delay, assumed")] = 0.0
 
 
 class Mains(NamedTuple):

@@ -121,7 +121,8 @@ KINDS = (
         "delay",
         ("delay",),
         "an additional delay",
-        _for_types(fixed_starts((5e-4, 2e-3, 5e-3, 1e-2, 2e-2), 1e-4), *RIG, Computer)
+        _for_types(fixed_starts((5e-4, 2e-3, 5e-3, 1e-2, 2e-2), 1e-4), *RIG)
+        | {Computer: fixed_starts((5e-4, 2e-3, 5e-3, 1e-2, 2e-2, 5e-2, 0.1, 0.2), 1e-4)}
         | _for_types(late_starts, *DESCRIBED)
         | {ForceSensor: late_or_early_starts},
         ACTS_LATE,

@@ -26,6 +26,8 @@ HEADER = 400
 """Number of lines within which the data must begin."""
 MOST_COLUMNS = 20_000
 """Largest number of columns of a file."""
+UNITS = 0.6
+"""Share of the texts in a line below the names that must be units for it to be a line of units."""
 NUMBERED = 3
 """Number of columns from which a first line 0, 1, 2, … is a header that numbers them."""
 
@@ -242,15 +244,21 @@ def _read_header(lines: Sequence[str], layout: Layout, columns: int) -> Layout:
             break
     names, units = [f"column{n + 1}" for n in range(columns)], [""] * columns
     if above:
-        nearest = above[0]
-        # A line of units alone, below the names.
-        marked = all(is_unit(cell) for cell in nearest)
-        if marked and len(above) > 1:
-            names, units = above[1], nearest
-        else:
-            names = nearest
+        stated = _read_units(above[0], above[1] if len(above) > 1 else ())
+        names, units = (above[1], stated) if stated else (above[0], units)
     pairs = [split_unit(name, unit) for name, unit in zip(names, units, strict=True)]
     return replace(layout, names=tuple(n for n, _ in pairs), units=tuple(u for _, u in pairs))
+
+
+def _read_units(cells: Sequence[str], names: Sequence[str]) -> list[str]:
+    """Return the units that the line below the names states; none where that is another line.
+
+    Some cells may be empty, or hold a unit that has no place here, such as that of a temperature.
+    """
+    texts = [cell.strip().strip("[]()").strip() for cell in cells]
+    known = sum(is_unit(text) for text in texts)
+    named = len(set(names)) == len(names) > 0 and all(names) and not all(map(is_unit, names))
+    return texts if named and known >= UNITS * sum(map(bool, texts)) > 0.0 else []
 
 
 ENDINGS = (".csv", ".txt", ".tsv", ".dat", ".asc", ".log")
