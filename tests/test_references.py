@@ -61,6 +61,20 @@ def test_a_command_in_the_unit_of_the_control_stays(tmp_path: Path) -> None:
     assert [each.column for each in reading.signals] == ["x_act", "cmd_x"]
 
 
+@pytest.mark.parametrize("heading", ["i_cmd_mA", "Vm_cmd"])
+def test_a_commanded_current_or_voltage_is_the_control(tmp_path: Path, heading: str) -> None:
+    """A current in mA drives a motor whose gear is its torque constant per ampere."""
+    mechanism, columns = _columns(
+        tmp_path, {"t": "time", "x_act": "position", heading: "current", "Im_meas": "current"}
+    )
+    scale = 1e-3 if heading.endswith("mA") else 1.0
+    values = {name: np.array(column) for name, column in columns.values.items()}
+    values[heading] /= scale
+    reading = read_log(mechanism, Columns(values), {})
+    (command,) = [each for each in reading.signals if each.quantity is not JointQuantity.POSITION]
+    assert (command.column, command.scale) == (heading, scale)
+
+
 @pytest.mark.parametrize(
     ("name", "unit", "quantity"),
     [

@@ -10,6 +10,7 @@ import numpy as np
 
 from rigtwin.description.mechanism import Mechanism
 from rigtwin.numerics.arrays import Array
+from rigtwin.signals.noise import white_noise
 
 SAMPLES = 2000
 """Rows at which inverse dynamics are worked out."""
@@ -24,6 +25,8 @@ MAGNITUDE_REVERSALS = 4
 POWER, HARMONICS = 0.9, 8.0
 """Share of the power of a joint's speed, and the multiple of the frequency below which that lies:
 dry friction has the odd harmonics of a motion."""
+STANDS_OUT = 3.0
+"""Ratio of a spectrum to that of the noise from which it is motion: single lines of noise vary."""
 LOWEST_BAND, HIGHEST_BAND = 5.0, 150.0
 """Hz, bounds of a band."""
 
@@ -115,6 +118,11 @@ def motion_band(time: Array, positions: Mapping[str, Array]) -> float:
         # Segments of 4 s resolve 0.25 Hz, below the motions of a test.
         length = min(len(speed), max(int(4.0 / step), 8))
         frequency, power = welch(speed, 1.0 / step, nperseg=length)
+        # White noise σ of the position has the one-sided density 2 σ² Δt; the central difference
+        # multiplies it by (sin(2πf Δt) / Δt)².
+        noise = 2.0 * white_noise(values) ** 2 * step
+        carried = noise * (np.sin(2.0 * np.pi * frequency * step) / step) ** 2
+        power = np.where(power > STANDS_OUT * carried, power - carried, 0.0)
         if np.sum(power) > 0.0:
             share = np.cumsum(power) / np.sum(power)
             frequencies.append(float(frequency[int(np.searchsorted(share, POWER))]))

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from rigtwin.describing.checks import follows
+from rigtwin.describing.heading import split_words, stated_unit
 from rigtwin.describing.log import STATED, Log
 from rigtwin.describing.match import MOTOR_CURRENT
 from rigtwin.describing.quantity import SI, JointQuantity
@@ -16,6 +17,7 @@ from rigtwin.describing.replay_kind import command_quantities, takes_force
 from rigtwin.describing.signal import LogSignal
 from rigtwin.describing.units import Unit, actuator_constant, command_unit
 from rigtwin.description.joint_elements import actuator_on
+from rigtwin.importing.units import is_unit, unit_of
 from rigtwin.numerics.arrays import Array
 
 SPAN = 0.05
@@ -195,9 +197,12 @@ def _control(log: Log, joint: str, quantity: JointQuantity) -> LogSignal | None:
         log.questions.append(str(question))
         return None
     unit = (source.unit if source else "") or log.columns.units.get(column, "")
+    scale, assumed = 1.0, () if unit else ("in the unit of the actuator's control",)
     if quantity is JointQuantity.CURRENT_COMMAND:
         # The gear of such an actuator is a torque constant, so that its control is a current.
-        unit = ""
+        stated = unit or stated_unit(split_words(column))
+        scale = unit_of(stated)[1] if is_unit(stated) and unit_of(stated)[0] == "A" else 1.0
+        unit, assumed = "", (f"{'A' if scale == 1.0 else stated} of the actuator's control",)
     signal = LogSignal(
         joint=joint,
         quantity=quantity,
@@ -205,7 +210,8 @@ def _control(log: Log, joint: str, quantity: JointQuantity) -> LogSignal | None:
         unit=unit or "1",
         why=why,
         sign=sign,
-        assumed=() if unit else ("in the unit of the actuator's control",),
+        assumed=assumed,
+        scale=scale,
     )
     return _as_control(log, signal)
 

@@ -117,7 +117,8 @@ def _motor_current(log: Log, joint: str, positions: Mapping[str, Array]) -> LogS
     columns = log.slots.columns(joint, JointQuantity.CURRENT)
     if actuator is None or log.mechanism.positions(actuator) or len(columns) != 1:
         return None
-    if not takes_force(log.mechanism, joint):
+    # What the actuator was told is its control, whatever current then flowed.
+    if not takes_force(log.mechanism, joint) or log.slots.has(joint, JointQuantity.COMMAND):
         return None
     constant = actuator_constant(log.mechanism, actuator)
     slope = _slope(log, joint, positions, log.columns.values[columns[0]])

@@ -72,6 +72,8 @@ def split_words(name: str) -> tuple[str, ...]:
         name = name.replace(letter, f" {word} ")
     # A capital N at the end is the unit: shaker_N has the words shaker, newton.
     name = re.sub(r"(?<=[_\s(\[])N(?=[)\]]?$)", "newton", name)
+    # Before words are parted at capitals, mA is a word.
+    name = re.sub(r"(?<=[_\s(\[])mA(?=[)\]]?$)", "ma", name)
     name = re.sub(r"([a-z])([A-Z])", r"\1 \2", name)
     words: list[str] = re.findall(r"[a-z]+|\d+", name.lower())
     return tuple(SHORT.get(word, word) for word in words)

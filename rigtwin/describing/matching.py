@@ -130,13 +130,14 @@ def _by_alias(
 def _commanded(quantity: JointQuantity | None) -> JointQuantity:
     if quantity is JointQuantity.FORCE:
         return JointQuantity.FORCE_COMMAND
-    if quantity in (None, JointQuantity.POSITION):
+    # A voltage that is commanded is the control, whatever the model's actuator makes of it.
+    if quantity in (None, JointQuantity.POSITION, JointQuantity.VOLTAGE):
         return JointQuantity.COMMAND
     if quantity is JointQuantity.VELOCITY:
         return JointQuantity.VELOCITY_COMMAND
     if quantity is JointQuantity.CURRENT:
         return JointQuantity.CURRENT_COMMAND
-    return JointQuantity.VOLTAGE if quantity is JointQuantity.VOLTAGE else JointQuantity.OTHER
+    return JointQuantity.OTHER
 
 
 def _place(inner: tuple[str, ...], outer: tuple[str, ...]) -> int | None:

@@ -14,7 +14,10 @@ from rigtwin.description.joint_elements import movable_joints
 
 def note_resting(log: Log, joints: Sequence[str]) -> None:
     """Note the joints whose position no column holds, or ask where a column may be that."""
-    resting = [joint for joint in movable_joints(log.mechanism) if joint not in joints]
+    absent = [joint for joint in movable_joints(log.mechanism) if joint not in joints]
+    followed = {tie.joint: tie.to for tie in log.mechanism.ties_of(joints)[0]}
+    log.notes += [f"{j}: it follows {followed[j]} by an equality" for j in absent if j in followed]
+    resting = [joint for joint in absent if joint not in followed]
     undecided = [j for j in resting if log.slots.stated(j, JointQuantity.POSITION) is None]
     unnamed = [name for name, why in log.unused.items() if why == UNNAMED and _is_position(name)]
     if undecided and unnamed:

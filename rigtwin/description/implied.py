@@ -189,6 +189,10 @@ def _add_group(
             tables[identifier(joint)] = {"joint": joint}
     if test == INVERSE:
         forces = _add_forces(joints, mechanism, tables)
+        for joint, name in zip(joints, sensors, strict=True) if len(joints) > 1 else ():
+            # A wrong zero shows in the gravity loads, as a constant force of one joint does not.
+            if any(mechanism.joint(joint).gravity):
+                tables[name]["effects"] = ["offset"]
         implied.replays.append({**keys, "moved_by": sensors, "observe": forces})
         return
     movers = _add_movers(test, joints, mechanism, tables, free)

@@ -371,6 +371,12 @@ class Mechanism:
             known.add(ordered[-1].joint)
         return tuple(ordered), tuple(t for t in remaining if t.joint in known and t.to in known)
 
+    def _dof(self, joint: str) -> int:
+        return int(self.model.jnt_dofadr[self.number("joint", joint)])
+
+    def _place(self, joint: str) -> int:
+        return int(self.model.jnt_qposadr[self.number("joint", joint)])
+
     def turns(self, joint: str) -> bool:
         """Return whether a joint is a hinge."""
         kind = int(self.model.jnt_type[self.number("joint", joint)])
@@ -422,7 +428,7 @@ class Mechanism:
         }
 
     def joint(self, name: str) -> Joint:
-        """Return the mechanics of a joint with all others at rest.
+        """Return the mechanics of a joint with all others at rest, except those that follow it.
 
         Raises RigtwinError unless the joint is a slide or a hinge.
         """
@@ -436,6 +442,12 @@ class Mechanism:
         mujoco.mj_forward(model, data)
         full = np.zeros((model.nv, model.nv))
         mujoco.mj_fullM(model, data, full)
+        # A joint that an equality ties to this one moves with it: q' = along * q'_joint.
+        ties = self.ties_of([name])[0]
+        along = np.zeros(model.nv)
+        along[at] = 1.0
+        for tie in ties:
+            along[self._dof(tie.joint)] = tie.ratio * along[self._dof(tie.to)]
         low, high = (float(v) for v in model.jnt_range[number])
         if not model.jnt_limited[number]:
             # Without limits: a whole turn, or 1 m to either side.
@@ -445,8 +457,11 @@ class Mechanism:
         load = np.empty(GRID)
         for step, position in enumerate(positions):
             data.qpos[place] = position
+            for tie in ties:
+                followed = data.qpos[self._place(tie.to)]
+                data.qpos[self._place(tie.joint)] = tie.offset + tie.ratio * followed
             mujoco.mj_forward(model, data)
-            load[step] = data.qfrc_bias[at]
+            load[step] = along @ data.qfrc_bias
         rest = float(model.qpos_spring[place])
         # Without gravity two points are enough, which keeps interpolation fast.
         gravity = tuple(load.tolist()) if np.any(np.abs(load) > 1e-12) else (0.0, 0.0)
@@ -455,8 +470,8 @@ class Mechanism:
         return Joint(
             name=name,
             turns=turns,
-            # M_qq with all other joints at rest; the armature is part of MuJoCo's inertia matrix.
-            inertia=float(full[at, at]),
+            # The armature is part of MuJoCo's inertia matrix.
+            inertia=float(along @ full @ along),
             positions=where,
             gravity=gravity,
             rest=rest,

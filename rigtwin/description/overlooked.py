@@ -52,7 +52,9 @@ def _followed_ties(
     """Return the joint equalities that replays with free joints satisfy."""
     free = [joint for replay in replays for joint in replay.free]
     if not free:
-        return ()
+        # A joint that is replayed alone carries along what is tied to it.
+        alone = [replay.joint.name for replay in replays if replay.guide or replay.mass]
+        return tuple(tie for joint in alone for tie in mechanism.ties_of([joint])[0])
     movers = [components[name] for replay in replays for name in replay.moved_by]
     prescribed = [mover.joint for mover in movers if mover.component_type in MEASURES]
     dependent = {tie.joint for tie in mechanism.ties_of([*free, *prescribed])[0]}

@@ -516,7 +516,7 @@ class HypothesisSearch:
         ]
         closest = min(remainders, key=lambda fit: fit.misfit, default=None)
         if closest is not None and frozenset(closest.effects) not in self._extended:
-            # A linear estimate of what each of them explains does not tell the best one for certain.
+            # A linear estimate of what each of them explains does not tell for certain the best.
             self._extend(closest, 2 * self.thresholds.additions)
 
     def _merge(self, leader: Fit) -> None:
