@@ -132,11 +132,14 @@ def acts(guide: Guide) -> bool:
     return any(value for name, value in guide._asdict().items() if name not in SHAPES)
 
 
-def rubs(guide: Guide) -> bool:
-    """Return whether a guide has dry friction whose soft form is known."""
-    return guide.soft_speed > 0.0 and bool(
-        guide.coulomb or guide.stribeck or guide.asymmetry or guide.load_coefficient
-    )
+def may_be_soft(guide: Guide) -> bool:
+    """Return whether a guide has dry friction of which the soft form is known.
+
+    Friction behind a play or a spring follows the recent motion and not its direction.
+    """
+    behind = guide.backlash or guide.compliance or guide.mount_compliance
+    dry = guide.coulomb or guide.stribeck or guide.asymmetry or guide.load_coefficient
+    return guide.soft_speed > 0.0 and bool(dry) and not behind
 
 
 def resists(guide: Guide) -> bool:

@@ -33,17 +33,20 @@ def _words(text: str) -> frozenset[str]:
 WORDS: dict[JointQuantity, frozenset[str]] = {
     JointQuantity.POSITION: _words(
         "pos position positions angle angles ang q qpos theta phi alpha beta psi encoder enc disp "
-        "displacement travel coordinate jointpos rotation location place qm winkel weg"
+        "displacement travel coordinate jointpos rotation location place qm winkel weg "
+        "angulo posicion"
     ),
     JointQuantity.VELOCITY: _words(
         "vel velocity velocities speed dq qd qvel qdot omega rate dtheta thetadot dphi rpm "
-        "jointvel geschwindigkeit drehzahl vitesse"
+        "jointvel geschwindigkeit drehzahl vitesse velocidad"
     ),
     JointQuantity.FORCE: _words(
         "tau torque torques force forces effort efforts trq tq frc moment loadcell "
-        "fx fy fz mx my mz kraft drehmoment"
+        "fx fy fz mx my mz kraft drehmoment couple par fuerza"
     ),
-    JointQuantity.CURRENT: _words("current currents cur curr amps amperage iq im strom courant"),
+    JointQuantity.CURRENT: _words(
+        "current currents cur curr amps amperage iq im strom courant corriente"
+    ),
     JointQuantity.VOLTAGE: _words("voltage volt volts vm"),
     JointQuantity.OTHER: _words(
         "acc accel acceleration ddq qdd qacc temp temperature error err status mode flag index "
@@ -54,7 +57,7 @@ WORDS: dict[JointQuantity, frozenset[str]] = {
 COMMANDED = _words(
     "cmd command commands commanded target targets goal goals desired des ref reference setpoint "
     "set qref qdes qcmd action actions demand demanded ctrl control u sp input joy joystick "
-    "soll sollwert consigne"
+    "soll sollwert consigne consigna"
 )
 """Words that say that a column was commanded and not measured."""
 REFERENCES = _words(
@@ -73,6 +76,7 @@ UNIT_WORDS = {
     "degs": "deg",
     "degree": "deg",
     "degrees": "deg",
+    "grados": "deg",
     "rad": "rad",
     "rads": "rad",
     "radians": "rad",
@@ -103,7 +107,9 @@ TESTS = _words("episode ep run trial rollout traj trajectory repetition rep expe
 """Words that name the number of a test."""
 COUNTING = _words("index idx id number nr no num")
 """Words that may stand beside them."""
-TIME = _words("t time timespan timestamp timestamps stamp clock elapsed seconds secs sec zeit")
+TIME = _words(
+    "t time timespan timestamp timestamps stamp clock elapsed seconds secs sec zeit tiempo"
+)
 """Words that name the time."""
 TIME_UNITS = {
     "s": "s",

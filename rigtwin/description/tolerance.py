@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from rigtwin.components.guide import Guide, rubs
+from rigtwin.components.guide import Guide, may_be_soft
 from rigtwin.components.plant import P, Plant, parameter_of, select, with_parameters
 
 MECHANICAL = ("mass", "stiffness", "constant", "coulomb", "viscous")
@@ -74,7 +74,7 @@ class Tolerance:
         if self.parameter != SOFTNESS:
             return False
         (component,) = select(plant, [self.group])
-        return isinstance(component, Guide) and not rubs(component)
+        return isinstance(component, Guide) and not may_be_soft(component)
 
     @property
     def mechanical(self) -> bool:

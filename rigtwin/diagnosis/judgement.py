@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from rigtwin.components import Effect, with_parameters
 from rigtwin.components.plant import Plant
 from rigtwin.description.configuration import Configuration
@@ -21,6 +23,10 @@ from rigtwin.diagnosis.sampling import SensorProperty
 from rigtwin.diagnosis.shrinkage import gap_level
 from rigtwin.diagnosis.support import Support
 from rigtwin.diagnosis.thresholds import Thresholds
+
+LOST, STANDS_OUT = 0.5, 5.0
+"""Share of a signal's standard deviation, and multiple of its noise, from which a residual is no
+noise, whatever the integration errors are."""
 
 
 @dataclass(frozen=True)
@@ -95,7 +101,25 @@ def judge(
         notes.append(f"{names} not named: the correction closes at most {share} of a signal's gap")
         named = ()
     plant = with_effects(evidence.plant, explanation.fit, named)
+    if _is_lost(evidence, plant):
+        has_residual = True
+        notes.append("the prediction misses most of a signal, so that little can be concluded")
     return Judgement(explanation, support, validation, named, has_residual, plant, tuple(notes))
+
+
+def _is_lost(evidence: Evidence, plant: Plant) -> bool:
+    """Return whether a prediction misses most of a signal that stands out of its noise.
+
+    Where the steps of the integration decide on a motion, their error counts as noise, and hardly
+    anything is left to be judged.
+    """
+    for lines, differences in zip(evidence.lines, evidence.differences(plant), strict=True):
+        counts = lines.fade.max(axis=0) > 0.5
+        missed = np.sqrt(np.mean(differences[:, counts] ** 2, axis=1))
+        least = np.maximum(LOST * np.std(lines.measured, axis=1), STANDS_OUT * lines.noise)
+        if np.any(missed > least):
+            return True
+    return False
 
 
 def _has_residual(explanation: Explanation, evidence: Evidence, named: Sequence[Effect]) -> bool:
