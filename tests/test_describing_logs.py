@@ -106,7 +106,7 @@ def test_an_arm_with_gears_is_asked_about_once_and_read_by_formulas():
     # A factor that the owner states is believed.
     assert answer.machine.components["torque_1"].kinds == frozenset()
     beside = "+".join(map(str, log))
-    assert rigtwin.describe(XML / "tx40.xml", beside, columns=stated).log == tuple(log)
+    assert rigtwin.describe(XML / "tx40.xml", beside, columns=stated).log.files == tuple(log)
 
 
 def test_a_motor_whose_command_is_zero_leaves_the_joint_free(tmp_path: Path):

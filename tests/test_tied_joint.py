@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+import rigtwin
+from rigtwin.components import with_parameters
 from rigtwin.description.mechanism import Mechanism
 
 LIFT = """
@@ -32,3 +35,30 @@ def test_a_tied_joint_adds_its_inertia_and_weight(tmp_path: Path, ratio: float) 
     joint = Mechanism(tmp_path / "lift.xml").joint("lift")
     assert joint.inertia == pytest.approx(46.0 + 7.5 + 38.0 * ratio**2)
     assert joint.gravity == pytest.approx([9.81 * (46.0 + 38.0 * ratio)] * len(joint.gravity))
+
+
+def test_a_load_on_a_balanced_lift_has_its_whole_weight(tmp_path: Path) -> None:
+    """A mass m more needs the force m (g + a), whatever the counterweight balances."""
+    (tmp_path / "lift.xml").write_text(
+        LIFT.format(ratio=-1).replace(
+            "</mujoco>", '<actuator><motor name="drive" joint="lift"/></actuator></mujoco>'
+        )
+    )
+    time = 0.002 * np.arange(4000)
+    acceleration = 2.0 * np.sin(5.0 * time)
+    log = {
+        "time": time,
+        "lift_position": -acceleration / 25.0,
+        "lift_force": 91.5 * acceleration + 78.48,
+    }
+    described = rigtwin.describe(tmp_path / "lift.xml", log)
+    recording = described.record()
+    configuration = described.machine.configuration_of(recording)
+    model = described.machine.physics.model(described.machine, recording.inputs, configuration, 1)
+    plant = configuration.plant
+    (mass,) = [name for name in described.machine.components if name == "carriage"]
+    heavier = with_parameters(plant, mass, {"mass": 84.0 + 6.0})
+    change = (model.predict(heavier) - model.predict(plant))[0]
+    inside = slice(400, -400)
+    expected = 6.0 * (9.81 + acceleration)
+    assert np.max(np.abs(change - expected)[inside]) < 0.02 * np.max(expected)

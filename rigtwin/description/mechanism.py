@@ -476,4 +476,5 @@ class Mechanism:
             gravity=gravity,
             rest=rest,
             armature=armature,
+            pull=0.0 if turns else -float(data.xaxis[number] @ model.opt.gravity),
         )

@@ -48,6 +48,8 @@ class Joint:
         Position at which the joint's spring is relaxed, m or rad.
     armature
         Part of the inertia that turns with the motor and has no weight, kg or kg m².
+    pull
+        Weight of one more kilogram on a slide, along its axis, N/kg; 0 of a hinge.
     """
 
     name: str
@@ -57,6 +59,7 @@ class Joint:
     gravity: tuple[float, ...]
     rest: float
     armature: float = 0.0
+    pull: float = 0.0
 
     @property
     def goes_round(self) -> bool:

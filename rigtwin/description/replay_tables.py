@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from rigtwin.components import Guide
+from rigtwin.components.guide import may_be_soft
 from rigtwin.description.component_tables import MOVING, PUSHING, SENSED, WHOLE, Components
 from rigtwin.description.control import Control, FormulaControl
 from rigtwin.description.joined_replays import JoinedReplays
@@ -330,8 +331,11 @@ class Replays:
         if not movers or not all(kind in SENSED for kind in movers):
             return
         declared = {(known.group, known.parameter) for known in self._components.tolerances}
-        for name, component in self._components.by_name.items():
-            if component.component_type is Guide and (name, SOFTNESS) not in declared:
+        for name, nominal in self._components.values.items():
+            # Only friction that the model states can have been simulated by it. With that of a real
+            # machine, which is weaker at low speeds, softness would trade size for shape.
+            soft = isinstance(nominal, Guide) and may_be_soft(nominal)
+            if soft and (name, SOFTNESS) not in declared:
                 self._components.tolerances.append(
                     Tolerance(name, SOFTNESS, 1.0, is_declared=False)
                 )

@@ -167,7 +167,7 @@ class JointSimulation:
         mass = 0.0 if replay.mass is None else component_of(plant, replay.mass, Mass).mass
         if replay.mass is not None or replay.rotor is not None:
             mass += self._armature(plant)
-        load = self._share_of_mass(plant) * np.array(joint.gravity)
+        load = self._gravity_load(plant)
         spacing = (joint.positions[-1] - joint.positions[0]) / max(len(joint.gravity) - 1, 1)
         # Overrides may hold whole numbers, and a compiled function is compiled again for each mix
         # of types.
@@ -175,16 +175,18 @@ class JointSimulation:
         mass = max(float(mass), LIGHTEST)
         return guide, Inertia(mass, joint.positions[0], spacing, load, joint.goes_round)
 
-    def _share_of_mass(self, plant: Plant) -> float:
-        """Return the factor on the mass of the MJCF's bodies.
+    def _gravity_load(self, plant: Plant) -> Array:
+        """Return the gravity load at the joint's positions, N or Nm.
 
-        It scales the gravity load. A rotor (armature) has inertia but no weight, so it is excluded.
+        The mass of a hinge's body scales it. What is added to a slide has a weight of its own, even
+        where a counterweight balances the rest. A rotor (armature) has no weight.
         """
-        joint, mass = self._replay.joint, self._replay.mass
+        joint, load = self._replay.joint, np.array(self._replay.joint.gravity)
         nominal = joint.inertia - joint.armature
-        if mass is None or nominal <= 0.0:
-            return 1.0
-        return component_of(plant, mass, Mass).mass / nominal
+        if self._replay.mass is None or nominal <= 0.0:
+            return load
+        mass = component_of(plant, self._replay.mass, Mass).mass
+        return load * (mass / nominal) if joint.turns else load + (mass - nominal) * joint.pull
 
     def _armature(self, plant: Plant) -> float:
         """Return the inertia of the rotor behind its gear, kg or kg m²."""

@@ -12,13 +12,13 @@ from collections.abc import Callable
 import mujoco
 import numpy as np
 
-from rigtwin.components import Guide
+from rigtwin.components import Guide, Mass
 from rigtwin.components.conditioning import actuator, condition, hold
 from rigtwin.components.dry_friction import dry_limits, friction, slide
 from rigtwin.components.guide_force import damping, position_force, quick_damping
 from rigtwin.components.guide_step import guide_step_of
 from rigtwin.components.mount import MountState, give_way
-from rigtwin.components.plant import Plant
+from rigtwin.components.plant import Plant, component_of
 from rigtwin.components.sensors import apply_sensor, sensor_of
 from rigtwin.components.servo import pull, push, push_law, pusher_of
 from rigtwin.description.control import FormulaControl
@@ -65,7 +65,9 @@ class MujocoModel(JointSimulation):
         joint = self._replay.joint
         number = model.joint(joint.name).id
         at, place = int(model.jnt_dofadr[number]), int(model.jnt_qposadr[number])
-        share = self._share_of_mass(plant)
+        nominal, mass, share = joint.inertia - joint.armature, self._replay.mass, 1.0
+        if mass is not None and nominal > 0.0:
+            share = component_of(plant, mass, Mass).mass / nominal
         model.body_mass[:] *= share
         model.body_inertia[:] *= share
         model.dof_armature[at] = self._armature(plant)
