@@ -99,3 +99,16 @@ def test_a_numpy_archive(tmp_path: Path):
 def test_anything_else_is_one_line(tmp_path: Path, data: object):
     with pytest.raises(RigtwinError):
         rigtwin.import_data(data, MAP, tmp_path / "out.mcap")  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("machine", [None, "tx40"])
+def test_a_table_without_a_model_is_refused_in_one_line(machine: str | None) -> None:
+    with pytest.raises(RigtwinError, match=r"^dict: expected a recording.*need a model") as error:
+        rigtwin.diagnose({"t": np.arange(9.0)}, machine=machine)
+    assert "\n" not in str(error.value)
+
+
+def test_several_files_are_paths(tmp_path: Path) -> None:
+    (tmp_path / "arm.xml").write_text("<mujoco/>")
+    with pytest.raises(RigtwinError, match="dict is no path"):
+        rigtwin.describe(tmp_path / "arm.xml", [{"t": np.arange(9.0)}])

@@ -132,7 +132,7 @@ def log_source(log: Log | reader.RecordedTest) -> LogSource:
     Raises
     ------
     RigtwinError
-        For a recording, which needs no description.
+        For a recording, which needs no description, and for a list of anything but files.
     """
     if isinstance(log, reader.RecordedTest):
         raise RigtwinError(
@@ -140,6 +140,9 @@ def log_source(log: Log | reader.RecordedTest) -> LogSource:
             "description of its machine"
         )
     if isinstance(log, list | tuple):
+        for file in log:
+            if not isinstance(file, str | Path):
+                raise RigtwinError(f"a log of several files: {type(file).__name__} is no path")
         return LogSource(tuple(Path(file) for file in log))
     if not isinstance(log, str | Path):
         return LogSource.of_table(log)

@@ -237,7 +237,10 @@ def resolve_recording(recording: reader.RecordedTest | str | Path) -> reader.Rec
         return recording
     if isinstance(recording, str | Path):
         return load(recording)
-    raise RigtwinError(f"{recording!r:.60}: expected a recording, or the path of one")
+    raise RigtwinError(
+        f"{type(recording).__name__}: expected a recording, or the path of one; data in memory "
+        "need a model (MJCF or URDF) as the machine"
+    )
 
 
 def with_machine(recording: reader.RecordedTest, machine: Machine | None) -> Recording:

@@ -409,7 +409,10 @@ class HypothesisSearch:
         return [fit for fit in fits if fit.effects]
 
     def _extend(self, leader: Fit, count: int = 0) -> None:
-        """Fit a hypothesis with one more effect, each of `count` others in turn."""
+        """Fit a hypothesis with one more effect, for each of the most promising effects.
+
+        Their number is `count`, or where that is 0 the usual one (`Thresholds.additions`).
+        """
         self._extended.add(frozenset(leader.effects))
         price = 2.0 * self.posterior.prices.ordinary
         proposals = choose_distinct(
