@@ -112,3 +112,8 @@ def test_several_files_are_paths(tmp_path: Path) -> None:
     (tmp_path / "arm.xml").write_text("<mujoco/>")
     with pytest.raises(RigtwinError, match="dict is no path"):
         rigtwin.describe(tmp_path / "arm.xml", [{"t": np.arange(9.0)}])
+
+
+def test_columns_of_different_lengths_are_refused() -> None:
+    with pytest.raises(RigtwinError, match="'q' has 6 rows, and 't' has 9"):
+        read_frame({"t": np.arange(9.0), "q": np.arange(6.0)}, EVERYTHING)

@@ -36,7 +36,7 @@ def read_frame(data: object, selection: Selection) -> Columns:
     Raises
     ------
     RigtwinError
-        For data of another kind.
+        For data of another kind, and columns of different lengths.
     """
     pairs, form = _list_columns(data)
     refused = repeated_names(name for name, _ in pairs)
@@ -58,7 +58,18 @@ def read_frame(data: object, selection: Selection) -> Columns:
         values |= numbers
         listed += numbers
         units |= dict.fromkeys(numbers, unit) if unit else {}
+    _require_one_length(values)
     return Columns(values, units, form, (), wrong, tuple(listed), refused)
+
+
+def _require_one_length(values: Mapping[str, Array]) -> None:
+    first = next(iter(values), "")
+    for name, column in values.items():
+        if len(column) != len(values[first]):
+            raise RigtwinError(
+                f"column {name!r} has {len(column)} rows, and {first!r} has {len(values[first])}; "
+                "expected equally many"
+            )
 
 
 def _list_columns(data: Any) -> tuple[list[tuple[str, Any]], str]:
