@@ -197,7 +197,10 @@ def _control(log: Log, joint: str, quantity: JointQuantity) -> LogSignal | None:
         log.questions.append(str(question))
         return None
     unit = (source.unit if source else "") or log.columns.units.get(column, "")
-    if is_unit(unit) and unit_of(unit)[0] == SI[JointQuantity.FORCE][not _turns(log, joint)]:
+    if (
+        is_unit(unit)
+        and unit_of(unit)[0] == SI[JointQuantity.FORCE][not log.mechanism.turns(joint)]
+    ):
         # A thrust in N is no torque of a hinge: what the actuator makes of it is its gear.
         unit = ""
     scale, assumed = 1.0, () if unit else ("in the unit of the actuator's control",)
@@ -217,10 +220,6 @@ def _control(log: Log, joint: str, quantity: JointQuantity) -> LogSignal | None:
         scale=scale,
     )
     return _as_control(log, signal)
-
-
-def _turns(log: Log, joint: str) -> bool:
-    return log.mechanism.turns(joint)
 
 
 def _as_control(log: Log, signal: LogSignal) -> LogSignal:

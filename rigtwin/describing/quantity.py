@@ -62,7 +62,7 @@ COMMANDED = _words(
 """Words that say that a column was commanded and not measured."""
 REFERENCES = _words(
     "target targets goal goals desired des ref reference setpoint set qref qdes sp soll sollwert "
-    "consigne"
+    "consigne consigna"
 )
 """Those of them that name the setpoint of a controller, and not what an actuator is given."""
 MEASURED = _words(

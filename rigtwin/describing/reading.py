@@ -121,7 +121,7 @@ def read_log(
     # Only forces can be held against inverse dynamics.
     if kind.test in (INVERSE, FORCES):
         signals = check_forces(log, signals, values)
-    note_resting(log, joints)
+    note_resting(log, joints, kind.test)
     if log.questions or log.clock is None:
         raise _all_questions(log, signals)
     velocities = [s.joint for s in motions.values() if s.quantity is JointQuantity.VELOCITY]

@@ -9,13 +9,16 @@ from rigtwin.describing.log import Log
 from rigtwin.describing.match import UNNAMED
 from rigtwin.describing.quantity import JointQuantity
 from rigtwin.describing.question import ask, enumerate_names, option
+from rigtwin.description.implied import INVERSE
 from rigtwin.description.joint_elements import movable_joints
 
 
-def note_resting(log: Log, joints: Sequence[str]) -> None:
+def note_resting(log: Log, joints: Sequence[str], test: str) -> None:
     """Note the joints whose position no column holds, or ask where a column may be that."""
     absent = [joint for joint in movable_joints(log.mechanism) if joint not in joints]
-    followed = {tie.joint: tie.to for tie in log.mechanism.ties_of(joints)[0]}
+    # Inverse dynamics of several joints leave equalities out.
+    leads = joints if len(joints) == 1 or test != INVERSE else ()
+    followed = {tie.joint: tie.to for tie in log.mechanism.ties_of(leads)[0]}
     log.notes += [f"{j}: it follows {followed[j]} by an equality" for j in absent if j in followed]
     resting = [joint for joint in absent if joint not in followed]
     undecided = [j for j in resting if log.slots.stated(j, JointQuantity.POSITION) is None]

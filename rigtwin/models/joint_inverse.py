@@ -68,7 +68,7 @@ def resist(guide_step: GuideStep, motion: Array, out: Array) -> None:
         half = 0.5 * guide.backlash
         dry, by = slide(x - slider, half, guide_step.spring, forward, backward)
         slider += by
-        if guide.softness != 0.0:
+        if guide.softness != 0.0 and guide.soft_speed > 0.0:
             dry += guide.softness * (soften(guide, v, motion[2, tick], forward, backward) - dry)
         viscous += guide_step.share * (damping(guide, v) * v - viscous)
         out[tick] = transmitted + dry + viscous + quick_damping(guide, x, v) * v
@@ -87,7 +87,7 @@ def resist_at_once(guide_step: GuideStep, motion: Array, out: Array) -> None:
         transmitted = out[tick] + position_force(guide, x, guide_step.rest)
         forward, backward = dry_limits(guide_step.dry_friction, v, transmitted)
         dry = forward if v > 0.0 else (-backward if v < 0.0 else 0.0)
-        if guide.softness != 0.0:
+        if guide.softness != 0.0 and guide.soft_speed > 0.0:
             dry += guide.softness * (soften(guide, v, motion[2, tick], forward, backward) - dry)
         viscous += guide_step.share * (damping(guide, v) * v - viscous)
         out[tick] = transmitted + dry + viscous + quick_damping(guide, x, v) * v
