@@ -237,9 +237,12 @@ def resolve_recording(recording: reader.RecordedTest | str | Path) -> reader.Rec
         return recording
     if isinstance(recording, str | Path):
         return load(recording)
+    shown = f"{recording!r:.60}"
+    if "\n" in shown:  # a table prints itself in several lines
+        shown = type(recording).__name__
     raise RigtwinError(
-        f"{type(recording).__name__}: expected a recording, or the path of one; data in memory "
-        "need a model (MJCF or URDF) as the machine"
+        f"{shown}: expected a recording, or the path of one; data in memory need a model "
+        "(MJCF or URDF) as the machine"
     )
 
 
