@@ -237,9 +237,8 @@ def resolve_recording(recording: reader.RecordedTest | str | Path) -> reader.Rec
         return recording
     if isinstance(recording, str | Path):
         return load(recording)
-    shown = f"{recording!r:.60}"
-    if "\n" in shown:  # a table prints itself in several lines
-        shown = type(recording).__name__
+    # A table or dictionary prints itself in several lines: its type is enough.
+    shown = type(recording).__name__ if hasattr(recording, "__len__") else f"{recording!r:.60}"
     raise RigtwinError(
         f"{shown}: expected a recording, or the path of one; data in memory need a model "
         "(MJCF or URDF) as the machine"
