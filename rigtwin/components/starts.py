@@ -9,6 +9,9 @@ import numpy as np
 from rigtwin.components.effect import Context, Guess, Starts
 from rigtwin.components.scales import Scales
 
+LEAST_CHANGE = 1e-3
+"""Smallest unit of the changes in a search, as a share of the nominal value."""
+
 
 def fixed_starts(values: Sequence[float], step: float) -> Guess:
     """Return a guess of fixed values, whatever the recording."""
@@ -40,7 +43,9 @@ def around_nominal(size: Callable[[Scales], float], shares: Sequence[float], ste
 
     def guess(at: Context) -> Starts:
         meaning = at.effect.quantities()[at.effect.kind.parameters[0]]
-        nominal, unit = at.nominal, size(at.scales)
+        nominal = at.nominal
+        # A change that rounding hides beside a large nominal value is none.
+        unit = max(size(at.scales), LEAST_CHANGE * abs(nominal))
         values = [min(max(nominal + share * unit, meaning.low), meaning.high) for share in shares]
         return Starts.single([v for v in dict.fromkeys(values) if v != nominal], step * unit)
 

@@ -216,12 +216,13 @@ class CoupledJoints:
         if guide_disturbance is not None:
             inputs = inputs._replace(guide_disturbance=guide_disturbance)
         contacts, size = self._drives.contacts(plant, inputs.pushes), multibody.coordinates
+        h = self._period / self._steps
+        # New data take longer than the simulation of a short window. Compiled code knows them by
+        # their address only: this name keeps them alive.
+        data: mujoco.MjData = multibody.data()
+        bodies = multibody.bodies(data, turning)
 
-        def move(start: Array, first: int, last: int) -> Array:
-            # Compiled code knows MuJoCo's data by its address only: this name keeps it alive.
-            data: mujoco.MjData = multibody.data()
-            bodies = multibody.bodies(data, turning)
-            h = self._period / self._steps
+        def move(start: Array, first: int, last: int, _: mujoco.MjData = data) -> Array:
             prescribed = inputs.prescribed[:, first * self._steps :]
             state = begin(contacts, start, prescribed, self._layout.held, h)
             out = np.zeros((3, size, last))

@@ -131,6 +131,7 @@ class InitialState:
         self.loose = loose
         self._judged: Judged | None = None
         self.growth = 1.0
+        self._inverses: dict[bool, tuple[Array, ...]] = {}
         # What the samples say does not depend on the plant.
         self._begun = {
             name: read_start(seen.measured, period, seen.noise, seen.earlier)
@@ -173,9 +174,14 @@ class InitialState:
                 place, _ = guess_place(seen.measured, self._period)
                 places.append(seen.along[None])
                 positions.append(np.array([place / sensor.gain]))
+        if swinging not in self._inverses:
+            # The directions of the sensors do not depend on the plant, and a prediction of many
+            # windows reads as many states.
+            inverse = tuple(np.linalg.pinv(np.concatenate(rows)) for rows in (places, rates))
+            self._inverses = {**self._inverses, swinging: inverse}
         start = [
-            np.linalg.lstsq(np.concatenate(rows), np.concatenate(values), rcond=None)[0]
-            for rows, values in ((places, positions), (rates, speeds))
+            inverse @ np.concatenate(values)
+            for inverse, values in zip(self._inverses[swinging], (positions, speeds), strict=True)
         ]
         return np.array(start, np.float64, order="C")
 

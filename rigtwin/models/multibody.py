@@ -71,7 +71,7 @@ class Multibody:
         self._ties, self._from, self._tied = ties, base, names
         self._numbers = [mechanism.number("joint", name) for name in names]
         self.coordinates = len(joints)
-        self._find_steady()
+        self._find_terms()
 
     def express(self, acts_on: Sequence[tuple[str, float]]) -> Array:
         """Return the direction of a component in the coordinates, shape (coordinates,).
@@ -152,7 +152,7 @@ class Multibody:
 
         changed = copy(self)
         changed._model = self._prepare(compile_model(self._path, alter))
-        changed._find_steady()
+        changed._find_terms()
         return changed
 
     def scale(self, shares: Mapping[str, float]) -> Multibody:
@@ -170,7 +170,7 @@ class Multibody:
             model.body_mass[carried] *= share
             model.body_inertia[carried] *= share
         mujoco.mj_setConst(model, mujoco.MjData(model))
-        scaled._find_steady()
+        scaled._find_terms()
         return scaled
 
     def _prepare(self, model: mujoco.MjModel) -> mujoco.MjModel:
@@ -182,8 +182,12 @@ class Multibody:
         mujoco.mj_setConst(model, mujoco.MjData(model))
         return model
 
-    def _find_steady(self) -> None:
-        """Remember inertia and bias if they are the same in every state."""
+    def _find_terms(self) -> None:
+        """Remember where the inertia matrix is stored, and its values where no state changes them.
+
+        The same holds for the bias.
+        """
+        self._projection = self._project()
         random = np.random.default_rng(PLACES)
         size = self.coordinates
         self._steady: Array | None = None
@@ -210,13 +214,12 @@ class Multibody:
         inertia of rotors, kg, shape (coordinates, coordinates).
         """
         model, size, steady = self._model, self.coordinates, self._steady
-        dofs = np.array([model.jnt_dofadr[n] for n in self._numbers], np.int64)
-        sources, targets, factors = self._project(dofs)
+        sources, targets, factors = self._projection
         return Bodies(
             model=model._address,
             data=data._address,
-            places=np.array([model.jnt_qposadr[n] for n in self._numbers], np.int64),
-            dofs=dofs,
+            places=np.array(model.jnt_qposadr[self._numbers], np.int64),
+            dofs=np.array(model.jnt_dofadr[self._numbers], np.int64),
             ties=self._ties,
             base=self._from,
             qpos=data.qpos,
@@ -224,9 +227,9 @@ class Multibody:
             bias=data.qfrc_bias,
             passive=data.qfrc_passive,
             entries=data.M,
-            sources=np.array(sources, np.int64),
-            targets=np.array(targets, np.int64).reshape(-1, 2),
-            factors=np.array(factors),
+            sources=sources,
+            targets=targets,
+            factors=factors,
             bias_address=data.qfrc_bias.ctypes.data,
             tendons=model.ntendon > 0,
             added=np.zeros((size, size)) if added is None else added,
@@ -235,14 +238,19 @@ class Multibody:
             constant=np.zeros(size) if steady is None else steady[:, -1].copy(),
         )
 
-    def _project(self, dofs: np.ndarray) -> tuple[list[int], list[tuple[int, int]], list[float]]:
-        """Return how entries of MuJoCo's inertia matrix add up to the coordinates' matrix."""
-        model, ties, joint_of = self._model, self._ties, {dof: j for j, dof in enumerate(dofs)}
+    def _project(self) -> tuple[np.ndarray, np.ndarray, Array]:
+        """Return how entries of MuJoCo's inertia matrix add up to the coordinates' matrix.
+
+        These are the numbers of the entries, their places in the coordinates' matrix, shape
+        (entries, 2), and their factors.
+        """
+        model, ties = self._model, self._ties
+        joint_of = {int(model.jnt_dofadr[n]): joint for joint, n in enumerate(self._numbers)}
         sources, targets, factors = [], [], []
         for dof, joint in joint_of.items():
             start = model.M_rowadr[dof]
             for entry in range(start, start + model.M_rownnz[dof]):
-                if (second := joint_of.get(model.M_colind[entry])) is None:
+                if (second := joint_of.get(int(model.M_colind[entry]))) is None:
                     continue
                 products = np.outer(ties[joint], ties[second])
                 # Only the lower triangle is stored: add the mirrored entry.
@@ -252,4 +260,5 @@ class Multibody:
                     sources.append(entry)
                     targets.append((int(i), int(j)))
                     factors.append(float(products[i, j]))
-        return sources, targets, factors
+        places = np.array(targets, np.int64).reshape(-1, 2)
+        return np.array(sources, np.int64), places, np.array(factors)
