@@ -93,6 +93,25 @@ def test_a_rival_that_does_worse_takes_no_more_weight(damped):
         assert again.inclusion(effect) >= before - 1e-6
 
 
+def test_noise_that_a_hypothesis_smooths_is_no_evidence_for_it(damped):
+    posterior = damped.posterior
+    best = posterior.best
+    # A filter takes half the noise out of a prediction, and out of its residual.
+    smooths = replace(best, levels=0.5 * best.levels, relief=np.full_like(best.levels, -0.5))
+    noisy = replace(best, relief=np.full_like(best.levels, 0.5))
+    halved = replace(best, levels=0.5 * best.levels)
+    relieved = replace(posterior.empty, relief=np.zeros_like(posterior.empty.levels))
+    posterior = HypothesisPosterior(
+        [relieved, best], posterior._fitter, len(posterior._pool), STANDARD
+    )
+    np.testing.assert_allclose(posterior.levels(noisy), posterior.levels(best))
+    np.testing.assert_allclose(
+        posterior.levels(smooths) * (posterior._noise - 0.5),
+        posterior.levels(halved) * posterior._noise,
+    )
+    assert posterior.loss(smooths) > posterior.loss(halved)
+
+
 def support(**changes: float) -> Support:
     values = {
         "probability": 0.9,

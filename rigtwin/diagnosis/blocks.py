@@ -166,8 +166,10 @@ def align(arrays: Sequence[Array]) -> Array:
     return stacked
 
 
-def excess_by_band(evidence: Evidence, fit: Fit) -> Array:
-    """Return the propagated noise at a fit beyond that at the nominal plant, averaged over bands.
+def excess_by_band(evidence: Evidence, fit: Fit) -> tuple[Array, Array]:
+    """Return how far the propagated noise at a fit is above and below that at the nominal plant.
+
+    Both are averaged over each band.
 
     Parameters
     ----------
@@ -178,23 +180,31 @@ def excess_by_band(evidence: Evidence, fit: Fit) -> Array:
 
     Returns
     -------
-    array
-        Variance in units of noise and declared error, shape (recordings, signals, bands).
+    above, below : Array
+        Variance in units of noise and declared error, 0 or more and 0 or less, shape (recordings,
+        signals, bands) each.
     """
-    even, averages = evidence.machine.prior.even, []
+    even = evidence.machine.prior.even
+    above: list[Array] = []
+    below: list[Array] = []
     for lines, excess in zip(evidence.lines, evidence.excess_noise(fit.plant), strict=True):
         bands = find_bands(lines.weight.shape[1], even)
         if excess is None:
-            averages.append(np.zeros((lines.weight.shape[0], len(bands))))
+            above.append(np.zeros((lines.weight.shape[0], len(bands))))
+            below.append(above[-1])
             continue
         # Excluded lines (the mains) have no weight, so their excess is 0 and would dilute a mean.
         counted = lines.weight > 0.0
-        by_band = [
-            np.sum(excess[:, band], axis=1) / np.maximum(np.sum(counted[:, band], axis=1), 1)
-            for band in bands
-        ]
-        averages.append(np.stack(by_band, axis=1))
-    return align(averages)
+        for averages, part in (
+            (above, np.maximum(excess, 0.0)),
+            (below, np.minimum(excess, 0.0)),
+        ):
+            by_band = [
+                np.sum(part[:, band], axis=1) / np.maximum(np.sum(counted[:, band], axis=1), 1)
+                for band in bands
+            ]
+            averages.append(np.stack(by_band, axis=1))
+    return align(above), align(below)
 
 
 def block_products(evidence: Evidence, stack: Array) -> tuple[Array, Array]:

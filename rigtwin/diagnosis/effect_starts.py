@@ -128,13 +128,21 @@ class EffectStarts:
         return self._scales[component]
 
     def _measured_position(self, component: str) -> Array | None:
-        """Return the measured positions of a component's joint in all recordings, if any."""
+        """Return the measured positions along a component in all recordings, if any.
+
+        They are those of its joint, or the length of its tendon by all joints that it passes.
+        """
         described = self._evidence.machine.components
         if component not in described:
             return None
+        rows = {
+            described[row.name].joint: number
+            for number, row in reversed(list(enumerate(self._evidence.machine.rows)))
+            if row.kind == "position" and row.name in described
+        }
         joint = described[component].joint
-        for number, row in enumerate(self._evidence.machine.rows):
-            at_joint = row.name in described and described[row.name].joint == joint
-            if row.kind == "position" and joint is not None and at_joint:
-                return np.concatenate([lines.measured[number] for lines in self._evidence.lines])
-        return None
+        along = ((joint, 1.0),) if joint else described[component].acts_on
+        if not along or not all(joint in rows for joint, _ in along):
+            return None
+        measured = np.concatenate([lines.measured for lines in self._evidence.lines], axis=1)
+        return np.asarray(sum(share * measured[rows[joint]] for joint, share in along))

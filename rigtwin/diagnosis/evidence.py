@@ -184,10 +184,10 @@ class Evidence:
         self.expected = sum(float(2 * np.count_nonzero(lines.weight)) for lines in self.lines)
 
     def excess_noise(self, plant: Plant) -> list[Array | None]:
-        """Return the propagated noise at a plant beyond that at the nominal plant.
+        """Return the propagated noise at a plant less that at the nominal plant.
 
         Dry friction reverses where a noisy measured motion does, so that a plant with friction
-        propagates more noise.
+        propagates more noise. A lag smooths the prediction and propagates less.
 
         Parameters
         ----------
@@ -218,7 +218,7 @@ class Evidence:
                 ]
             )
             # weight² is 1 / v, so the excess becomes relative to the variance of the line.
-            excesses.append(np.maximum(spread - lines.spread, 0.0) * lines.weight**2)
+            excesses.append((spread - lines.spread) * lines.weight**2)
         return excesses
 
     def halve_steps(self) -> Evidence:

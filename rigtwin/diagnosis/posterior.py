@@ -36,6 +36,9 @@ from rigtwin.diagnosis.scoring import Scored
 from rigtwin.diagnosis.thresholds import Thresholds
 from rigtwin.numerics.arrays import Array
 
+LEAST_NOISE = 1e-3
+"""Smallest share of noise and declared error that a hypothesis may leave."""
+
 
 class HypothesisPosterior:
     """Weights of all hypotheses that were scored.
@@ -98,7 +101,8 @@ class HypothesisPosterior:
     def levels(self, scored: Scored) -> Array:
         """Return the power of a held-out residual, in units of noise and declared error.
 
-        The noise is that propagated at the reference hypothesis.
+        The noise is that propagated at the reference hypothesis, less what the hypothesis itself
+        smooths: a lag that takes noise out of a prediction explains nothing by that.
 
         Parameters
         ----------
@@ -110,7 +114,8 @@ class HypothesisPosterior:
         array
             Power q, shape (recordings, signals, bands).
         """
-        return scored.levels / self._noise
+        relief = np.minimum(scored.relief - self.empty.relief, 0.0)
+        return scored.levels / np.maximum(self._noise + relief, LEAST_NOISE)
 
     def loss(self, scored: Scored) -> float:
         """Return minus the log predictive density of a hypothesis, nats."""

@@ -56,9 +56,9 @@ class Scored:
         Number of independent samples of the residual, of the same shape.
     samples
         Number of all samples, of the same shape.
-    excess
-        Noise of the motions that drive the model beyond that at the nominal plant, as a share of
-        noise and declared error, of the same shape.
+    excess, relief
+        Noise of the motions that drive the model, above and below that at the nominal
+        plant, as shares of noise and declared error, of the same shape. `relief` is 0 or less.
     widths
         Standard error of each value: the larger of the formal one and the sandwich estimate over
         blocks. The latter is valid for coloured residuals.
@@ -83,6 +83,7 @@ class Scored:
     pieces: Array = field(repr=False)
     samples: Array = field(repr=False)
     excess: Array = field(repr=False)
+    relief: Array = field(repr=False)
     widths: Values = field(default=(), repr=False)
     reach: Array = field(default_factory=lambda: np.zeros((0, 0)), repr=False)
     together: Array = field(default_factory=lambda: np.zeros((0, 0)), repr=False)
@@ -170,13 +171,15 @@ class Scorer:
         levels, inside = cross_validate(
             products, expected, prior, prior * _pad(estimate[free], count)
         )
+        excess, relief = excess_by_band(evidence, fit)
         scored = Scored(
             fit=fit,
             levels=levels,
             inside=inside,
             pieces=np.minimum(count_independent(evidence, residual), samples),
             samples=samples,
-            excess=excess_by_band(evidence, fit),
+            excess=excess,
+            relief=relief,
         )
         if not count:
             return scored

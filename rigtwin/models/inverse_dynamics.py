@@ -336,19 +336,21 @@ class InverseDynamicsModel(Model[Plant]):
     def propagated_noise(self, plant: Plant) -> Array | None:
         """Return the change of the forces by the noise of the measured motions.
 
-        The noise passes through smoothing, differentiation and the dynamics of all joints. Several
-        draws are added and divided by the root of their number, which keeps the strength of one:
-        the error where dry friction reverses comes from few ticks, so a single draw is uncertain.
+        The noise passes through smoothing, differentiation, the dynamics of all joints and the
+        sensors of the forces. Several draws are added and divided by the root of their number,
+        which keeps the strength of one: the error where dry friction reverses comes from few ticks,
+        so a single draw is uncertain.
         """
-        undisturbed, total = self.predict_true(plant), np.zeros(())
+        undisturbed, total = self.predict(plant), np.zeros(())
         motions = self._draw_motions(plant)
         for number, (motion, forces) in enumerate(motions):
             bodies = forces + self._surplus(plant, motion, (number, *self._key(plant)))
             forces_drawn = self._rows_of(bodies).copy()
             for name, onto in self._onto.items():
                 forces_drawn += onto[:, None] * self._share_of(name, plant, motion, bodies)
-            total = total + (forces_drawn - undisturbed) / math.sqrt(len(motions))
-        return limit_band(total, self.band, self._interval) if total.shape else None
+            measured = self._apply_sensors(plant, forces_drawn)
+            total = total + (measured - undisturbed) / math.sqrt(len(motions))
+        return total if total.shape else None
 
     def _draw_motions(self, plant: Plant) -> list[tuple[Kinematics, Array]]:
         """Return motions with redrawn noise, and the forces of the MJCF's bodies for them.

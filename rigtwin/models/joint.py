@@ -255,8 +255,8 @@ class JointModel(Model[Plant]):
             level = white_noise(self._signals.column(*joint.mover.channel))
             again, _ = smooth(joint.motion + level * random.standard_normal(ticks), self._period)
             shift = (again - joint.motion)[:: self.every]
-            carried = self._rows(self.move(plant, shift=shift)) - self._rows(self.move(plant))
-            return limit_band(carried, self.band, joint.interval)
+            noisy = self._rows(self.move(plant, shift=shift))
+            return self._apply_sensors(plant, noisy) - self.predict(plant)
         if not joint.control.sensors:
             return None
         noise = joint.control.draw_noise(random)

@@ -97,7 +97,7 @@ def test_excess_noise_is_averaged_over_the_lines_that_count():
     evidence = evidence_of(0.0)
     plant = PLANT._replace(rail=PLANT.rail._replace(asymmetry=3.0))
     fit: Any = SimpleNamespace(plant=plant)
-    found = excess_by_band(evidence, fit)
+    found, _ = excess_by_band(evidence, fit)
     assert found.shape == (2, 2, 4)
     np.testing.assert_allclose(found[0], 0.3)
     np.testing.assert_allclose(found[1], np.tile([0.3, 0.3, 0.3, 0.0], (2, 1)))
@@ -106,14 +106,14 @@ def test_excess_noise_is_averaged_over_the_lines_that_count():
     excess[:, 40:80] = 0.0
     evidence.lines[0].weight[:, 40:80] = 0.0
     evidence.excess_noise = lambda plant: [excess, None]
-    half = excess_by_band(evidence, fit)
+    half, _ = excess_by_band(evidence, fit)
     np.testing.assert_allclose(half[0], 0.3)
     assert not np.any(half[1])
     evidence.lines[0].weight[:, :40] = 0.0
     excess[:, :40] = 0.0
-    assert excess_by_band(evidence, fit)[0, 0, 0] == 0.0
+    assert excess_by_band(evidence, fit)[0][0, 0, 0] == 0.0
     excess[:, 0] = 0.5
-    assert excess_by_band(evidence, fit)[0, 0, 0] == 0.5
+    assert excess_by_band(evidence, fit)[0][0, 0, 0] == 0.5
 
 
 @pytest.mark.parametrize("even", [0.0, 1.0])
