@@ -53,6 +53,53 @@ def test_forces_tell_rad_from_degrees(tmp_path: Path, unit: str, drift: float):
     assert "by the forces, which are 1 times the model's" in position.assumed[0]
 
 
+WINCH = """<mujoco><compiler angle="radian"/><worldbody>
+<body name="drum"><joint name="drum" axis="0 1 0" damping="0.5"/>
+<inertial pos="0 0 0" mass="9" diaginertia="0.1 0.1 0.1"/></body>
+<body name="load"><joint name="load" type="slide" axis="0 0 1" damping="4"/>
+<inertial pos="0 0 0" mass="40" diaginertia="0.6 0.6 0.6"/></body></worldbody>
+<tendon><fixed name="rope" stiffness="60000" damping="180" springlength="0">
+<joint joint="drum" coef="0.06"/><joint joint="load" coef="-1"/></fixed></tendon>
+<actuator><motor name="motor" joint="drum" gear="30"/></actuator></mujoco>"""
+
+
+def test_a_slide_beside_a_drum_is_never_in_degrees(tmp_path: Path):
+    (tmp_path / "winch.xml").write_text(WINCH)
+    time = PERIOD * np.arange(ROWS)
+    lift = 0.8 + 0.4 * np.sin(0.9 * time) + 0.2 * np.sin(2.3 * time)
+    speed, rate = np.gradient(lift, PERIOD), np.gradient(np.gradient(lift, PERIOD), PERIOD)
+    tension = 40.0 * (9.81 + rate) + 4.0 * speed
+    drum = (lift + tension / 60000.0) / 0.06
+    torque = 0.1 * rate / 0.06 + 0.5 * speed / 0.06 + 0.06 * tension
+    log = {"t": time, "tau_motor": torque / 30.0, "phi_drum": drum, "z_load": lift}
+    answer = rigtwin.describe(tmp_path / "winch.xml", write_log(tmp_path / "log.csv", log))
+    units = {signal.key: signal.unit for signal in answer.reading.signals}
+    assert units["drum.position"] == "rad"
+    assert units["load.position"] == "m"
+
+
+@pytest.mark.parametrize(("largest", "is_taken"), [(2.0, True), (0.02, False), (40.0, False)])
+def test_a_current_that_the_model_explains_badly_may_still_be_the_control(
+    tmp_path: Path, largest: float, is_taken: bool
+):
+    model = tmp_path / "shaft.xml"
+    limits = 'gear="11" ctrllimited="true" ctrlrange="-3 3"'
+    model.write_text(SHAFT.replace('gear="{gear}"', limits))
+    # A wave along the stroke takes nearly all of the current.
+    motion = shaft_motion()
+    current = largest * np.sin(40.0 * motion["angle"])
+    log = {"time": motion["time"], "shaft_position": motion["angle"], "motor_current": current}
+    path, units = write_log(tmp_path / "log.csv", log), {"*.position": "[rad]"}
+    if not is_taken:
+        with pytest.raises(RigtwinError, match="what force at the joint does one ampere make"):
+            rigtwin.describe(model, path, columns=units)
+        return
+    answer = rigtwin.describe(model, path, columns=units)
+    (force,) = (signal for signal in answer.reading.signals if signal.key == "shaft.force")
+    assert force.scale == 11.0
+    assert "its control may be -3 to 3, which the current makes use of" in force.assumed[0]
+
+
 @pytest.mark.parametrize(("share", "is_doubted"), [(6.0, False), (60.0, True), (0.05, True)])
 def test_a_stated_unit_is_doubted_only_by_a_very_different_force(
     tmp_path: Path, share: float, is_doubted: bool

@@ -21,6 +21,8 @@ from rigtwin.numerics.arrays import Array
 
 NEAR_GEAR = 2.0
 """Factor within which the ratio of two forces may differ from the gear of the model's actuator."""
+USED, WITHIN = 0.3, 1.02
+"""Shares of a control's limit between which the largest current makes use of its range."""
 SLOPE_LOW, SLOPE_HIGH = 0.2, 5.0
 """Measured force for each unit of the model's; beyond, its unit or a gear is in doubt."""
 SLOPE_HIGHEST = 25.0
@@ -111,7 +113,8 @@ def _motor_current(log: Log, joint: str, positions: Mapping[str, Array]) -> LogS
     """Return the current of a joint's motor as its force; None where that is not evident.
 
     The gear of a motor whose control is a current is its force constant. It is taken for that where
-    the model's inverse dynamics explain the current, with a constant near the gear.
+    the model's inverse dynamics explain the current, with a constant near the gear. Where they
+    explain little of any current, one that makes use of the control's range is taken for it.
     """
     actuator = actuator_on(log.mechanism, joint)
     columns = log.slots.columns(joint, JointQuantity.CURRENT)
@@ -122,13 +125,22 @@ def _motor_current(log: Log, joint: str, positions: Mapping[str, Array]) -> LogS
         return None
     constant = actuator_constant(log.mechanism, actuator)
     slope = _slope(log, joint, positions, log.columns.values[columns[0]])
-    if constant in (0.0, 1.0) or slope is None or slope.explained < SHOWN:
+    if constant in (0.0, 1.0):
         return None
     unit = log.columns.units.get(columns[0], "") or "A"
-    ratio = abs(slope.slope * constant * unit_of(unit)[1])
-    if not 1.0 / NEAR_GEAR < ratio < NEAR_GEAR:
-        return None
     si = SI[JointQuantity.FORCE][log.mechanism.turns(joint)]
+    assumed = f"times the gear of the model's actuator, {constant:g} {si}/A"
+    if slope is not None and slope.explained >= SHOWN:
+        ratio = abs(slope.slope * constant * unit_of(unit)[1])
+        if not 1.0 / NEAR_GEAR < ratio < NEAR_GEAR:
+            return None
+    else:
+        low, high = log.mechanism.command_limits(actuator)
+        current = unit_of(unit)[1] * log.columns.values[columns[0]]
+        used = float(np.nanmax(np.abs(current))) / max(-low, high)
+        if not USED < used <= WITHIN:
+            return None
+        assumed += f"; its control may be {low:g} to {high:g}, which the current makes use of"
     return LogSignal(
         joint=joint,
         quantity=JointQuantity.FORCE,
@@ -136,7 +148,7 @@ def _motor_current(log: Log, joint: str, positions: Mapping[str, Array]) -> LogS
         unit=unit,
         scale=constant,
         why=MOTOR_CURRENT,
-        assumed=(f"times the gear of the model's actuator, {constant:g} {si}/A",),
+        assumed=(assumed,),
     )
 
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from rigtwin.describing.log import STATED, Log
+from rigtwin.describing.log import STATED, Log, bridge
 from rigtwin.describing.quantity import JointQuantity
 from rigtwin.describing.question import Question, UnitQuestion, ask, enumerate_names, option
 from rigtwin.describing.signal import LogSignal
@@ -126,12 +126,34 @@ def _units(log: Log, columns: dict[str, str]) -> dict[str, Unit] | None:
     general = log.stated.units.get(JointQuantity.POSITION)
     if general is not None:
         return dict.fromkeys(columns, Unit(general))
+    units: dict[str, Unit] = {}
+    # Slides first: their unit, m or mm, is seldom in doubt.
+    for turns in (False, True):
+        alike = {j: column for j, column in columns.items() if log.mechanism.turns(j) is turns}
+        known = {
+            joint: unit_of(unit.name)[1] * bridge(log.columns.values[columns[joint]])
+            for joint, unit in units.items()
+        }
+        common = _units_alike(log, alike, known) if alike else {}
+        if common is None:
+            return None
+        units |= common
+    return units
+
+
+def _units_alike(
+    log: Log, columns: dict[str, str], known: Mapping[str, Array]
+) -> dict[str, Unit] | None:
+    """Return the units of joints that all turn or all slide; None with a question noted.
+
+    `known` maps joints of the other kind to their positions, SI.
+    """
     try:
         return position_units(log.mechanism, log.columns, columns)
     except Question as question:
         if isinstance(question, UnitQuestion):
             unit = unit_by_velocity(log, columns, question.units)
-            unit = unit or unit_by_force(log, columns, question.units)
+            unit = unit or unit_by_force(log, columns, question.units, known)
             if unit is None and question.likely:
                 small = question.units[-1]
                 unit = Unit(small, f"{small} by its range, as the joint has none of its own")

@@ -24,6 +24,9 @@ from rigtwin.numerics.arrays import Array
 CLEAR, POOR = 0.8, 0.3
 """Share of the forces that the model explains with the right unit, and at most with any other, to
 tell the unit whatever the ratio."""
+WORSE = 10.0
+"""Factor on the share of the forces that the model leaves unexplained with any other unit, from
+which the unit is told as well."""
 SHOWN = 0.1
 """Share of a force that the model must explain to count."""
 CLOSE, FAR = 5.0, 8.0
@@ -33,7 +36,9 @@ FORCES = (JointQuantity.FORCE, JointQuantity.FORCE_COMMAND, JointQuantity.COMMAN
 """Quantities that may be the force at a joint, the surest first."""
 
 
-def unit_by_force(log: Log, columns: Mapping[str, str], units: Sequence[str]) -> Unit | None:
+def unit_by_force(
+    log: Log, columns: Mapping[str, str], units: Sequence[str], known: Mapping[str, Array]
+) -> Unit | None:
     """Return the unit in which the model needs the forces that the log holds.
 
     Parameters
@@ -44,6 +49,8 @@ def unit_by_force(log: Log, columns: Mapping[str, str], units: Sequence[str]) ->
         Joint → column of its position.
     units
         Units that are possible.
+    known
+        Joint → position of a joint whose unit is known, SI, shape (rows,).
 
     Returns
     -------
@@ -55,7 +62,7 @@ def unit_by_force(log: Log, columns: Mapping[str, str], units: Sequence[str]) ->
         return None
     ratios, explained = {}, {}
     for unit in units:
-        positions = {
+        positions = dict(known) | {
             joint: unit_of(unit)[1] * bridge(log.columns.values[column])
             for joint, column in columns.items()
         }
@@ -67,7 +74,11 @@ def unit_by_force(log: Log, columns: Mapping[str, str], units: Sequence[str]) ->
     if not ratios:
         return None
     clearest = max(explained, key=lambda unit: explained[unit])
-    if explained[clearest] > CLEAR and sum(share > POOR for share in explained.values()) == 1:
+    least = 1.0 - explained[clearest]
+    rivals = [share for unit, share in explained.items() if unit != clearest]
+    if explained[clearest] > CLEAR and all(
+        share <= POOR or 1.0 - share > WORSE * least for share in rivals
+    ):
         share = 100.0 * explained[clearest]
         return Unit(
             clearest, f"{clearest} by the forces, of which the model explains {share:.0f} %"
