@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import math
 import pickle
+from types import SimpleNamespace
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -28,6 +30,7 @@ from rigtwin.components import (
 )
 from rigtwin.components.conditioning import actuator, condition, hold
 from rigtwin.components.dry_friction import breakaway, friction, gap_at
+from rigtwin.components.starts import around_nominal
 from rigtwin.description.catalogue import find, shipped
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.effects import apply_effects, with_effect
@@ -307,3 +310,15 @@ def test_every_effect_of_every_machine_goes_to_another_process_and_back():
 
 def test_kinds_are_told_by_name_and_components():
     assert all(pickle.loads(pickle.dumps(kind)) is kind for kind in KINDS)
+
+
+def test_a_change_too_small_for_rounding_is_still_searched():
+    guess = around_nominal(lambda scales: scales.force / scales.stroke, (-0.3, 0.02, 0.9), 0.005)
+    nothing = SimpleNamespace(force=1e-12, stroke=1e-3)
+    meaning = {"stiffness": SimpleNamespace(low=0.0, high=1e12)}
+    kind = SimpleNamespace(parameters=("stiffness",))
+    effect = SimpleNamespace(quantities=lambda: meaning, kind=kind)
+    context: Any = SimpleNamespace(effect=effect, nominal=8e6, scales=nothing)
+    starts = guess(context)
+    assert len(starts.values) == 3
+    assert all(abs(value - 8e6) > 1.0 for (value,) in starts.values)

@@ -44,7 +44,7 @@ class Guide(NamedTuple):
 
         force        = F_viscous + drag·v·|v| + F_position + F_stop + F_dry
         F_viscous    = (viscous ± ½·viscous_asymmetry)·v, through a first-order lag `relaxation`
-        F_position   = stiffness·(x − x_rest) + offset
+        F_position   = stiffness·t(x − x_rest) + offset
                        + cogging·sin(2π·x/cogging_pitch + cogging_phase)
                        + Σ_n curve_n·T_n(ξ),  n = 2 … 5
                        + stop_stiffness·s(x)
@@ -68,6 +68,9 @@ class Guide(NamedTuple):
     Its sign is that of the motion to come, so that it reverses early (docs/theory.md, "Dry
     friction").
 
+    t(d) is how far d lies beyond ±½·slack, and 0 between them: a spring bears no force while its
+    gap is crossed.
+
     s(x) is how far x lies beyond `stop_high`, or below `stop_low` (negative), and 0 between them.
 
     The transmitted force is what reaches the guide from the body and the guide's own spring where
@@ -79,6 +82,7 @@ class Guide(NamedTuple):
     coulomb: Annotated[float, Quantity("N", 0.0, 1e7, MJCF)] = 0.0
     viscous: Annotated[float, Quantity("Ns/m", 0.0, 1e9, MJCF)] = 0.0
     stiffness: Annotated[float, Quantity("N/m", 0.0, 1e12, MJCF)] = 0.0
+    slack: Annotated[float, Quantity("m", 0.0, 10.0, MJCF)] = 0.0
     stribeck: Annotated[float, Quantity("N", -1e7, 1e7, NONE)] = 0.0
     stribeck_velocity: Annotated[
         float, Quantity("m/s", 1e-6, 100.0, "of the order seen in guides, assumed")
@@ -114,6 +118,7 @@ class Guide(NamedTuple):
 STOPS = ("stop_low", "stop_high")
 """Positions of the end stops."""
 SHAPES = (
+    "slack",
     "stribeck_velocity",
     "stribeck_exponent",
     "cogging_pitch",

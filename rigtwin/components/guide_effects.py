@@ -85,6 +85,13 @@ def _stribeck(context: Context) -> Starts:
     return Starts(tuple(product(amplitudes, speeds)), steps, bounds=bounds)
 
 
+def _slack(context: Context) -> Starts:
+    # The ends of a spring that is stiff part by little more than its gap.
+    low, high = context.scales.span
+    travel = max(high - low, SHORTEST)
+    return Starts.single([share * travel for share in (0.4, 0.8, 0.95)], 0.002 * travel)
+
+
 def _cogging(context: Context) -> Starts:
     force, stroke = context.scales.force, context.scales.stroke
     # Wavelengths that fit the stroke three to forty times.
@@ -203,6 +210,13 @@ KINDS = (
                 0.005,
             ),
         },
+    ),
+    Kind(
+        "slack",
+        "slack",
+        ("slack",),
+        "a gap within which a spring bears no force",
+        {Guide: _slack},
     ),
     Kind(
         "cogging",

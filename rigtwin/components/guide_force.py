@@ -63,6 +63,13 @@ def beyond_stop(guide: Guide, position: float) -> float:
 
 
 @compilable
+def beyond_slack(guide: Guide, deflection: float) -> float:
+    """Return how far a spring is stretched once its gap is crossed, m."""
+    half = 0.5 * guide.slack
+    return deflection - min(max(deflection, -half), half)
+
+
+@compilable
 def quick_damping(guide: Guide, position: float, velocity: float) -> float:
     """Return the coefficient of the damping that follows the velocity at once, Ns/m.
 
@@ -78,10 +85,10 @@ def quick_damping(guide: Guide, position: float, velocity: float) -> float:
 def position_force(guide: Guide, position: float, rest: float) -> float:
     """Return spring, constant force, cogging, curve and end stops at a position, N.
 
-    F = stiffness·(x − rest) + offset + cogging·sin(2π·x/cogging_pitch + cogging_phase) + curve
-    + stop_stiffness·s(x), with the way s(x) beyond an end stop.
+    F = stiffness·t(x − rest) + offset + cogging·sin(2π·x/cogging_pitch + cogging_phase) + curve
+    + stop_stiffness·s(x), with the way s(x) beyond an end stop, and the way t(d) beyond the slack.
     """
-    force = guide.stiffness * (position - rest) + guide.offset
+    force = guide.stiffness * beyond_slack(guide, position - rest) + guide.offset
     if has_curve(guide):
         force += curve(guide, position)
     if guide.cogging != 0.0:

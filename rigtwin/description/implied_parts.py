@@ -101,7 +101,8 @@ def add_tendons(
         along = [joint for joint, _ in mechanism.acts_on("tendon", tendon)]
         if along and set(along) <= set(joints):
             effects = ["coulomb", "viscous"]
-            effects += ["stiffness"] if mechanism.friction("tendon", tendon)["stiffness"] else []
+            if mechanism.friction("tendon", tendon)["stiffness"]:
+                effects += ["stiffness", "slack"]
             tables[identifier(tendon)] = {"tendon": tendon, "effects": effects}
 
 

@@ -389,17 +389,23 @@ class Mechanism:
             return float(self.model.tendon_armature[number])
         return float(self.model.dof_armature[int(self.model.jnt_dofadr[number])])
 
+    def rest_length(self, tendon: str) -> float:
+        """Return the length of a tendon in the middle of the gap of its spring, m or rad."""
+        return float(np.mean(self.model.tendon_lengthspring[self.number("tendon", tendon)]))
+
     def friction(self, element: str, name: str) -> dict[str, float]:
         """Return friction, damping and stiffness of a joint or tendon as parameters of a Guide."""
         model, number = self.model, self.number(element, name)
         if element == "tendon":
             dry, damping = model.tendon_frictionloss[number], model.tendon_damping[number]
             stiffness, weight = model.tendon_stiffness[number], model.tendon_invweight0[number]
+            slack = float(np.ptp(model.tendon_lengthspring[number]))
             reference, impedance = model.tendon_solref_fri[number], model.tendon_solimp_fri[number]
         else:
             at = int(model.jnt_dofadr[number])
             dry, damping = model.dof_frictionloss[at], model.dof_damping[at]
             stiffness, weight = model.jnt_stiffness[number], model.dof_invweight0[at]
+            slack = 0.0
             reference, impedance = model.dof_solref[at], model.dof_solimp[at]
         # The constraint asks for the acceleration −v / T within ± the friction. Its reference is a
         # time constant and a damping ratio, or, where negative, a stiffness and a damping.
@@ -410,6 +416,7 @@ class Mechanism:
             "coulomb": float(dry),
             "viscous": float(np.ravel(damping)[0]),
             "stiffness": float(np.ravel(stiffness)[0]),
+            "slack": slack,
             "soft_time": soft_time,
             "soft_speed": soft_time * (1.0 - low) / low * float(weight),
         }

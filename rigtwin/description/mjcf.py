@@ -103,6 +103,11 @@ def _apply(document: Document, machine: Machine, change: Change, changes: Sequen
             return False
         document.set(tag, attribute, _number(change.value * _factor_of(component, changes)))
         return True
+    if change.parameter == "slack" and component.element == "tendon":
+        tag = document.find(component.element, component.mjcf)
+        rest, half = Mechanism(machine.model).rest_length(component.mjcf), 0.5 * change.value
+        document.set(tag, "springlength", f"{_number(rest - half)} {_number(rest + half)}")
+        return True
     if change.parameter in STOP and component.element == "joint":
         _set_stops(document, machine, component, changes)
         return True

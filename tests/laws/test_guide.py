@@ -193,6 +193,17 @@ def test_forces_of_the_position_are_spring_offset_and_waves(guide, position):
     assert position_force(guide, position, 0.004) == pytest.approx(expected, abs=1e-12)
 
 
+@law_of("slack", Guide)
+@pytest.mark.parametrize(
+    ("deflection", "pull"),
+    [(0.02, 34.0), (0.0031, 0.2), (0.003, 0.0), (-0.001, 0.0), (-0.01, -14.0)],
+)
+def test_a_spring_bears_no_force_within_its_slack(deflection, pull):
+    """F = k (d ∓ ½ s) beyond ±½ s, with d the deflection."""
+    guide = Guide(stiffness=2000.0, slack=0.006)
+    assert position_force(guide, 0.004 + deflection, 0.004) == pytest.approx(pull, abs=1e-9)
+
+
 def test_the_nominal_wave_has_a_pitch_of_30_mm_and_no_phase():
     guide = Guide(cogging=3.0)
     assert position_force(guide, 0.0075, 0.0) == pytest.approx(3.0)
