@@ -14,9 +14,9 @@ import numpy as np
 
 from rigtwin.api.describing import record_again
 from rigtwin.api.diagnosis_data import DiagnosisData
-from rigtwin.api.recordings import Recording
-from rigtwin.describing.other_view import VIEWS, describe_otherwise
-from rigtwin.description.implied import FORCES, SERVOS
+from rigtwin.api.recordings import Origin, Recording
+from rigtwin.describing.other_view import DRIVES, VIEWS, describe_otherwise
+from rigtwin.description.implied import FORCES, INVERSE, SERVOS
 from rigtwin.description.machine import Machine
 from rigtwin.diagnosis.diagnose import diagnose as find_reasons
 from rigtwin.diagnosis.evidence import Evidence, relative_errors
@@ -27,6 +27,14 @@ from rigtwin.recording import RecordedTest
 EARLIER = 0.7
 """Share of the nominal twin's error that commands one row earlier must leave at most to be
 tried."""
+DRIVE_EFFORT = 100.0
+"""Most processor time spent on the servos of a machine whose forces show no gap, s."""
+PREDICTED = "the motion that the servos' commands cause shows no gap either"
+UNPREDICTED = (
+    "the forces are right, but the motion that the commands would cause by the model's servos is "
+    "not the measured one: --test servos says why"
+)
+"""Notes on servos whose commands are not the reason for another answer."""
 COMMANDS = "/command"
 """Topic of the commands."""
 AFTER = (
@@ -73,8 +81,10 @@ def look_otherwise(
     progress
         Called with the name of a stage and the number of steps done in it.
     """
-    if diagnosis.verdict in ("no gap", "unusable"):
+    if diagnosis.verdict == "unusable":
         return diagnosis
+    if diagnosis.verdict == "no gap":
+        return _judge_drives(diagnosis, data, thresholds, progress)
     for attempt in _attempts(data, _closed_share(diagnosis)):
         other = find_reasons(
             attempt.data.machine,
@@ -95,6 +105,46 @@ def look_otherwise(
     return diagnosis
 
 
+def _judge_drives(
+    diagnosis: Diagnosis,
+    data: DiagnosisData,
+    thresholds: Thresholds,
+    progress: Callable[[str, int], object],
+) -> Diagnosis:
+    """Return what the commands of servos show where the forces along the motion show no gap."""
+    logs = _logs(data)
+    if not logs or logs[0].described.reading.kind.test != INVERSE:
+        return diagnosis
+    seen = describe_otherwise(logs[0].described, DRIVES)
+    if seen is None:
+        return diagnosis
+    other = _record_again(seen.machine, record_again(seen, logs), data)
+    # What a reference does that is no command of these servos cannot be explained, however long.
+    brief = replace(thresholds, effort=min(thresholds.effort, DRIVE_EFFORT))
+    drives = find_reasons(
+        other.machine,
+        other.recordings,
+        None,
+        other.held_out,
+        (),
+        progress=progress,
+        thresholds=brief,
+    )
+    if drives.verdict == "explained":
+        return _with_note(drives, diagnosis, DRIVES.reason)
+    note = PREDICTED if drives.verdict == "no gap" else UNPREDICTED
+    answer = replace(diagnosis.answer, notes=(note, *diagnosis.answer.notes))
+    return replace(diagnosis, answer=answer)
+
+
+def _logs(data: DiagnosisData) -> list[Origin]:
+    """Return the logs that the recordings of some data were made of, none if any is no log."""
+    recordings = (*data.recordings, *data.held_out)
+    origins = [recording.origin for recording in recordings if isinstance(recording, Recording)]
+    logs = [origin for origin in origins if origin is not None]
+    return logs if len(logs) == len(recordings) else []
+
+
 def _closed_share(diagnosis: Diagnosis) -> float:
     """Return the share of the gap that an answer closes, 1 where there is no gap to close."""
     if diagnosis.verdict not in ("unknown", "partly explained") or diagnosis.gap is None:
@@ -110,10 +160,8 @@ def _names_force_sensor(diagnosis: Diagnosis, machine: Machine) -> bool:
 
 def _attempts(data: DiagnosisData, closed: float) -> Iterator[Attempt]:
     """Yield the ways to take logs otherwise, of which an answer closes a share of the gap."""
-    recordings = (*data.recordings, *data.held_out)
-    origins = [recording.origin for recording in recordings if isinstance(recording, Recording)]
-    logs = [origin for origin in origins if origin is not None]
-    if len(logs) < len(recordings):
+    logs = _logs(data)
+    if not logs:
         return
     described = logs[0].described
     if described.reading.kind.test in (FORCES, SERVOS) and (early := _with_commands_earlier(data)):

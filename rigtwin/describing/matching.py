@@ -12,6 +12,7 @@ from rigtwin.describing.joint_names import QUANTITY_WORDS, Alias, list_aliases, 
 from rigtwin.describing.match import NUMBERED, REMAINING, UNNAMED, Match
 from rigtwin.describing.quantity import ANGULAR, AXIAL, COORDINATES, MEASURED, JointQuantity
 from rigtwin.describing.question import enumerate_names
+from rigtwin.describing.stacked_states import split_state
 from rigtwin.description.joint_elements import actuator_on, movable_joints
 from rigtwin.description.mechanism import Mechanism
 from rigtwin.importing.columns import Columns
@@ -63,7 +64,11 @@ def match_columns(
         else:
             unused[column] = UNNAMED
     for family in _families(numbered).values():
-        matched, reason = _by_number(family, numbered, columns.units, joints)
+        ordered = sorted(family, key=lambda column: _number(numbered[column]))
+        state = split_state(ordered, columns.values, joints)
+        matched, reason = (
+            (state, "") if state else _by_number(family, numbered, columns.units, joints)
+        )
         matches += matched
         unused |= {column: reason for column in family} if reason else {}
     if (match := _remaining(columns, joints, matches, unused)) is not None:

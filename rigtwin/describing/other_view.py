@@ -10,7 +10,7 @@ limit is known.
 
 A log of servos may hold their commands and their forces. Play before the position sensor, or a
 force that is sampled between two commands, contradicts inverse dynamics, but not the motion that
-the commands cause.
+the commands cause. Where the forces show no gap, the servos that give them may have one.
 """
 
 from __future__ import annotations
@@ -84,6 +84,14 @@ VIEWS = {
     ),
 }
 """Kind of a test → the views in which the same log may be judged, in the order of trial."""
+DRIVES = OtherView(
+    SERVOS,
+    1.0,
+    1.0,
+    "judged by the motion that the servos' commands cause, as the forces along the measured motion "
+    "show no gap; --test inverse-dynamics judges these alone",
+)
+"""View that judges the servos of a machine whose forces show no gap."""
 
 
 def describe_otherwise(described: Described, view: OtherView) -> Described | None:
