@@ -11,7 +11,7 @@ import pytest
 from rigtwin.models.forward_dynamics import ForwardDynamicsModel
 from rigtwin.models.initial_state import InitialState
 from rigtwin.models.start import read_start
-from rigtwin.models.windows import FEWEST, GROWN, divide
+from rigtwin.models.windows import FEWEST, GROWN, SHORTEST, divide
 from tests.helpers.coupled import PERIOD, arm, integrate, recording
 
 NOISE = 2e-4
@@ -76,3 +76,12 @@ def test_a_start_is_read_from_both_sides_and_no_more_stiffly_than_the_motion() -
     assert errors[0] > errors[1] > errors[2]
     assert both[0] == pytest.approx(value, abs=2e-3)
     assert errors[2] < 0.1
+
+
+@pytest.mark.parametrize(("rate", "longest"), [(10.7, 0.4), (200.0, 0.3)])
+def test_a_short_pendulum_upright_cannot_fall_within_a_window(rate: float, longest: float) -> None:
+    """Errors grow by the rate a second; no window is shorter than 0.15 s, however they grow."""
+    windows = divide(0, 12000, 0.002, judge_by(0.002 * rate))
+    lengths = [0.002 * window.ticks for window in windows]
+    assert min(lengths) >= SHORTEST
+    assert max(lengths) <= longest

@@ -23,7 +23,7 @@ GROWN = 15.0
 """Largest growth of an initial error within a window. A pendulum that swings regularly reaches 10
 within tens of periods; chaos multiplies errors by e several times a second, and beyond this growth
 a fitted state depends on its data too nonlinearly."""
-SHORTEST, FEWEST = 0.5, 40
+SHORTEST, FEWEST = 0.15, 40
 """Shortest window: time, s, and number of ticks. Each window costs two unknowns per joint."""
 
 
