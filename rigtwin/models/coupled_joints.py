@@ -221,12 +221,13 @@ class CoupledJoints:
         # their address only: this name keeps them alive.
         data: mujoco.MjData = multibody.data()
         bodies = multibody.bodies(data, turning)
+        # Each window writes its own ticks.
+        out = np.zeros((3, size, self._ticks))
+        work = allocate(size, self._loose, len(self._layout.guides), len(self._layout.servos))
 
         def move(start: Array, first: int, last: int, _: mujoco.MjData = data) -> Array:
             prescribed = inputs.prescribed[:, first * self._steps :]
             state = begin(contacts, start, prescribed, self._layout.held, h)
-            out = np.zeros((3, size, last))
-            work = allocate(size, self._loose, len(self._layout.guides), len(self._layout.servos))
             advance(
                 bodies=bodies,
                 contacts=contacts,
@@ -241,7 +242,7 @@ class CoupledJoints:
                 last=last,
                 out=out,
             )
-            return out[:, :, first:]
+            return out[:, :, first:last].copy()
 
         return move
 

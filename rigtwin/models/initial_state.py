@@ -308,8 +308,11 @@ class InitialState:
         assert judged is not None
         residual = judged.measured - predicted[list(judged.rows), : judged.ticks]
         # A wrong model must not be blamed on the initial state: its residual widens the tolerance.
-        weights = 1.0 / np.maximum(judged.held**2, np.mean(residual**2, axis=1))
-        normal = np.tensordot(weights, judged.squares, axes=1) + np.eye(len(moved)) / LIKELY**2
+        power = np.einsum("rt,rt->r", residual, residual) / judged.ticks
+        weights = 1.0 / np.maximum(judged.held**2, power)
+        count = len(moved)
+        normal = (weights @ judged.squares.reshape(len(weights), -1)).reshape(count, count)
+        normal.ravel()[:: count + 1] += 1.0 / LIKELY**2
         pull = (weights[:, None] * residual).ravel() @ judged.slopes - moved / LIKELY**2
         return np.linalg.solve(normal, pull)
 
