@@ -30,6 +30,7 @@ SIZES = {
     "coulomb": 7.0,
     "viscous": 15.0,
     "stiffness": 240.0,
+    "slack": 0.02,
     "stribeck": 3.0,
     "asymmetry": 3.0,
     "backlash": 0.01,
@@ -55,7 +56,10 @@ SIZES = {
     "rate_limit": 120.0,
 }
 """Each effect's magnitude; large, so that a law that is not there is seen."""
-SHAPES = {"end_stops": {"stop_damping": 5.0, "stop_low": -0.03, "stop_high": 0.06}}
+SHAPES = {
+    "end_stops": {"stop_damping": 5.0, "stop_low": -0.03, "stop_high": 0.06},
+    "slack": {"stiffness": 240.0},
+}
 """Other parameters of an effect that has none at their nominal values."""
 
 

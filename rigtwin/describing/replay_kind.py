@@ -79,10 +79,7 @@ def choose_kind(
         If the quantities of the log fit no test.
     """
     if stated:
-        wanted = stated.replace("-", " ").replace("_", " ").strip().lower()
-        if wanted not in TESTS:
-            raise RigtwinError(f"--test {stated}: {suggest(stated, TESTS)}")
-        return ReplayKind(wanted, "as stated")
+        return ReplayKind(_read_stated(stated), "as stated")
     positions = [j for j in joints if _takes_position(mechanism, j)]
     commanded = slots.joints(JointQuantity.COMMAND, joints)
     if by_servos and placed:
@@ -108,6 +105,14 @@ def choose_kind(
             )
         return ReplayKind(FORCES, "the actuators take forces, and those are in the log")
     raise _question(mechanism, joints, measured, commanded)
+
+
+def _read_stated(stated: str) -> str:
+    """Return the kind of test that the owner of a log states, however it is spelt."""
+    wanted = stated.replace("-", " ").replace("_", " ").strip().lower()
+    if wanted not in TESTS:
+        raise RigtwinError(f"--test {stated}: {suggest(stated, TESTS)}")
+    return wanted
 
 
 def free_swing(

@@ -49,6 +49,7 @@ PICTURES: dict[str, str] = {
     "tilt_z": "position",
     "backlash": "loop",
     "stiffness": "loop",
+    "slack": "loop",
     "hardening": "loop",
     "compliance": "loop",
     "mount": "loop",
