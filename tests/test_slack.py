@@ -67,3 +67,9 @@ def test_a_hidden_gap_is_found_and_written_into_the_model(folder: Path, tmp_path
     answer.save_mjcf(tmp_path / "corrected.xml")
     corrected = mujoco.MjModel.from_xml_path(str(tmp_path / "corrected.xml"))
     assert np.ptp(corrected.tendon_lengthspring[0]) == pytest.approx(parameter.value, rel=1e-5)
+
+
+def test_a_joint_without_a_spring_is_not_searched_for_slack(folder: Path) -> None:
+    answer = rigtwin.describe(folder / "tight.xml", play(folder, 1), columns={"*.position": "[m]"})
+    slack = [e.name for e in answer.machine.effects() if e.kind.name == "slack"]
+    assert slack == ["slack@drive"]

@@ -124,6 +124,9 @@ class Kind:
         as both together would be known by their product alone.
     points : callable or None
         Function that returns positions and forces of a curve, m and N, from its parameters.
+    needs : str
+        Parameter without which the effect does nothing; empty if there is none. A machine whose
+        nominal value of it is 0 is not searched for the effect.
     """
 
     name: str
@@ -139,6 +142,7 @@ class Kind:
     points: Callable[[Mapping[str, float]], Points] | None = field(
         default=None, compare=False, repr=False
     )
+    needs: str = field(default="", compare=False, repr=False)
 
     @property
     def fitted(self) -> tuple[str, ...]:

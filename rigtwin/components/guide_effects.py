@@ -217,6 +217,7 @@ KINDS = (
         ("slack",),
         "a gap within which a spring bears no force",
         {Guide: _slack},
+        needs="stiffness",
     ),
     Kind(
         "cogging",

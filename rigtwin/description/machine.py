@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from rigtwin.components import Effect, candidates
-from rigtwin.components.plant import select
+from rigtwin.components.plant import parameter_of, select
 from rigtwin.components.quantity import Quantity
 from rigtwin.description.changes import override
 from rigtwin.description.component import Component
@@ -209,6 +209,8 @@ class Machine:
             if effect.group == "computer" and len(movers) < 2:
                 continue
             if effect.name in self.excluded or (effect.of, effect.kind.name) in self.physics.lacks:
+                continue
+            if effect.kind.needs and not parameter_of(self.plant, effect.group, effect.kind.needs):
                 continue
             known = self.components.get(effect.group)
             if known is None or known.kinds is None or effect.kind.name in known.kinds:

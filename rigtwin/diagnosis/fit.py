@@ -104,7 +104,7 @@ def _changed(effect: Effect) -> tuple[set[str], set[str]]:
 
 
 def is_possible(effects: Sequence[Effect], plant: Plant) -> bool:
-    """Return whether every effect has the dry friction or the spring that it acts through.
+    """Return whether every effect has the dry friction that it acts through.
 
     Parameters
     ----------
@@ -116,19 +116,12 @@ def is_possible(effects: Sequence[Effect], plant: Plant) -> bool:
     Returns
     -------
     bool
-        False if a play, a spring or a Stribeck peak of a guide has no dry friction in series, or a
-        slack no spring.
+        False if a play, a spring or a Stribeck peak of a guide has no dry friction in series.
     """
     # Either a fitted friction or that of the plant will do: the kinds of `THROUGH_FRICTION` act in
     # series with it.
     dry = {effect.group for effect in effects if effect.kind.name == "coulomb"}
-    sprung = {effect.group for effect in effects if effect.kind.name == "stiffness"}
     return all(
-        effect.kind.name != "slack"
-        or effect.group in sprung
-        or parameter_of(plant, effect.group, "stiffness") != 0.0
-        for effect in effects
-    ) and all(
         effect.of is not Guide
         or effect.kind.name not in THROUGH_FRICTION
         or effect.group in dry
