@@ -16,7 +16,7 @@ follows from the products J'J, J'r and r'r of every block, so that judging a fit
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -145,15 +145,7 @@ class Scorer:
         )
         residual = residual_at(values)
         used = np.array(fit.used) if fit.used else np.zeros(space.columns.shape[1])
-        columns = np.zeros((len(residual), 0))
-        steps = np.zeros(0)
-        if count:
-            steps = np.concatenate([fitter.starts(effect).steps for effect in fit.effects])
-            _, high = fitter.bounds(fit.effects)
-            columns = take_derivatives(residual_at, values, residual, steps, high)
-            # A step that changes more than the residual itself gives a secant far from the tangent.
-            steps = steps * shorten(columns, float(residual @ residual))
-            columns = take_derivatives(residual_at, values, residual, steps, high)
+        columns, steps = self._derive(fit, residual_at, values, residual)
         # Tolerances at their bound are fixed there; the others are free about their estimate.
         estimate = space.estimate_tolerances(residual + space.columns @ used)
         free = np.abs(estimate) < BOUND
@@ -193,6 +185,19 @@ class Scorer:
             rest=self._rest(products, expected),
             bounded=fitter.is_bounded(fit),
         )
+
+    def _derive(
+        self, fit: Fit, residual_at: Callable[[Array], Array], values: Array, residual: Array
+    ) -> tuple[Array, Array]:
+        """Return the change of the residual by a step of each value, and these steps."""
+        if not fit.effects:
+            return np.zeros((len(residual), 0)), np.zeros(0)
+        steps = np.concatenate([self._fitter.starts(effect).steps for effect in fit.effects])
+        _, high = self._fitter.bounds(fit.effects)
+        columns = take_derivatives(residual_at, values, residual, steps, high)
+        # A step that changes more than the residual itself gives a secant far from the tangent.
+        steps = steps * shorten(columns, float(residual @ residual))
+        return take_derivatives(residual_at, values, residual, steps, high), steps
 
     def _moves(self, fit: Fit, values: Array, steps: Array) -> Array:
         """Return the difference of each effect's magnitudes from nominal, in steps.
