@@ -137,7 +137,8 @@ def _motor_current(log: Log, joint: str, positions: Mapping[str, Array]) -> LogS
     else:
         low, high = log.mechanism.command_limits(actuator)
         current = unit_of(unit)[1] * log.columns.values[columns[0]]
-        used = float(np.nanmax(np.abs(current))) / max(-low, high)
+        known = np.abs(current[np.isfinite(current)])
+        used = float(np.max(known, initial=0.0)) / max(-low, high)
         if not USED < used <= WITHIN:
             return None
         assumed += f"; its control may be {low:g} to {high:g}, which the current makes use of"

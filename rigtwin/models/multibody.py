@@ -71,7 +71,7 @@ class Multibody:
         self._ties, self._from, self._tied = ties, base, names
         self._numbers = [mechanism.number("joint", name) for name in names]
         self.coordinates = len(joints)
-        self._find_terms()
+        self._remember_terms()
 
     def express(self, acts_on: Sequence[tuple[str, float]]) -> Array:
         """Return the direction of a component in the coordinates, shape (coordinates,).
@@ -152,7 +152,7 @@ class Multibody:
 
         changed = copy(self)
         changed._model = self._prepare(compile_model(self._path, alter))
-        changed._find_terms()
+        changed._remember_terms()
         return changed
 
     def scale(self, shares: Mapping[str, float]) -> Multibody:
@@ -170,7 +170,7 @@ class Multibody:
             model.body_mass[carried] *= share
             model.body_inertia[carried] *= share
         mujoco.mj_setConst(model, mujoco.MjData(model))
-        scaled._find_terms()
+        scaled._remember_terms()
         return scaled
 
     def _prepare(self, model: mujoco.MjModel) -> mujoco.MjModel:
@@ -182,11 +182,8 @@ class Multibody:
         mujoco.mj_setConst(model, mujoco.MjData(model))
         return model
 
-    def _find_terms(self) -> None:
-        """Remember where the inertia matrix is stored, and its values where no state changes them.
-
-        The same holds for the bias.
-        """
+    def _remember_terms(self) -> None:
+        """Remember how MuJoCo stores the inertia matrix, and both terms if they are constant."""
         self._projection = self._project()
         random = np.random.default_rng(PLACES)
         size = self.coordinates
