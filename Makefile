@@ -41,10 +41,10 @@ demo: setup system
 
 # A file's tests share what they recorded and diagnosed: one worker takes them all.
 test: setup system browser
-	$(BIN)/python -m pytest -n auto --dist loadfile
+	$(BIN)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder
 
 test-slow: setup system
-	$(BIN)/python -m pytest -n auto --dist loadfile -m slow
+	$(BIN)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder -m slow
 
 browser:
 	@bash scripts/browser.sh

@@ -14,6 +14,17 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
+FIRST = ("test_supervised.py", "test_mujoco.py", "test_referee.py", "test_rths.py")
+"""Files that compile the rig, the joints, the referee and the hybrid test. The workers take them
+one after another, so that each compiles something else and no other file waits for it."""
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Put the tests first whose compiled functions most others need."""
+    order = {name: place for place, name in enumerate(FIRST)}
+    items.sort(key=lambda item: order.get(item.path.name, len(FIRST)))
+
+
 @pytest.fixture(scope="session")
 def example() -> RecordedTest:
     """8 s of a rig without defects, which is not the twin."""

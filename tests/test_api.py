@@ -136,6 +136,7 @@ def still(configuration: rigtwin.Configuration, seed: int) -> np.ndarray:
     return np.zeros((configuration.ticks, 3))
 
 
+@pytest.mark.slow
 def test_a_controller_of_ones_own_runs_the_rig_and_is_not_called_a_fault():
     rig = rigtwin.machine("suspension-rig")
     own = rigtwin.run(rig, "drop", controller=Spring(), settings=SHORT)

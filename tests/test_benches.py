@@ -110,6 +110,7 @@ def test_a_bench_without_effects_has_no_gap(truth):
     assert not found.effects
 
 
+@pytest.mark.slow
 def test_play_lies_within_a_few_millimetres_after_a_reversal():
     found = answered(SINGLE["play"][0])
     (place,) = [place for place in found.where if place.evidence.startswith("backlash")]
@@ -117,6 +118,7 @@ def test_play_lies_within_a_few_millimetres_after_a_reversal():
     assert 2.0 < float(place.region.split()[1]) < 8.0
 
 
+@pytest.mark.slow
 def test_what_was_found_one_after_another_is_told():
     found = answered(SINGLE["play"][0])
     residuals = [step.residual["load_cell"] for step in found.answer.steps]

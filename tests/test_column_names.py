@@ -182,6 +182,16 @@ def test_a_general_word_identifies_a_joint_without_another(tmp_path: Path) -> No
     assert known["load_shaft.position"] == "load angle"
 
 
+def test_a_general_word_counts_where_another_joint_has_no_other_name(tmp_path: Path) -> None:
+    model = LEG.replace("hip_pitch", "motor_shaft").replace("knee", "link_joint")
+    columns = {"enc_motor [rad]": SWING, "enc_link [rad]": SWING}
+    columns |= {"cmd_motor [rad]": SWING, "cmd_link [rad]": SWING}
+    known = sources(tmp_path, model, columns)
+    assert known["motor_shaft.position"] == "enc_motor"
+    assert known["link_joint.position"] == "enc_link"
+    assert known["motor_shaft.command"] == "cmd_motor"
+
+
 def test_a_moment_about_an_axis_is_a_joints_force_beside_its_name_alone(tmp_path: Path) -> None:
     columns = {"shaft_pos": SWING, "Mz_shaft": INERTIA * ACCELERATION, "mx": SWING, "temps": TIME}
     assert sources(tmp_path, SHAFT, columns)["shaft.force"] == "Mz_shaft"

@@ -426,7 +426,10 @@ def test_the_only_column_left_is_the_position_of_the_only_joint(tmp_path: Path):
     assert any("the only column left" in line for line in answer.assumptions)
 
 
-@pytest.mark.parametrize(("stiffness", "named"), [(120.0, []), (150.0, ["stiffness@rail"])])
+@pytest.mark.parametrize(
+    ("stiffness", "named"),
+    [(120.0, []), pytest.param(150.0, ["stiffness@rail"], marks=pytest.mark.slow)],
+)
 def test_a_held_force_half_a_row_early_is_no_gap(tmp_path: Path, stiffness: float, named):
     """A controller holds its force from row to row, and the logged force has no noise."""
     text = """<mujoco><option timestep="0.0005" integrator="implicitfast"/><worldbody>

@@ -78,11 +78,7 @@ def assert_named(outcome: Diagnosis, name: str) -> None:
 
 @pytest.mark.parametrize(
     "name",
-    [
-        pytest.param(name, marks=() if name == "known-delay-structure_cylinder" else SLOW)
-        for name in KNOWN
-        if name in SHIPPED
-    ],
+    [pytest.param(name, marks=SLOW) for name in KNOWN if name in SHIPPED],
 )
 def test_a_known_effect_is_named_with_its_magnitude(name):
     assert_named(answer(shipped(name)), name)
@@ -183,6 +179,7 @@ def drifting(recording: RecordedTest, rate: float) -> RecordedTest:
     return replace_sensors(recording, suspension_lvdt=moved)
 
 
+@pytest.mark.slow
 def test_a_free_disturbance_is_judged_beside_the_tolerances_that_the_plant_uses():
     evidence = evidence_of(drifting(recorded("imposed", (), 8.0), 1e-4))
     offset = find("offset@suspension_lvdt", evidence.plant)

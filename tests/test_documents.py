@@ -10,7 +10,7 @@ import re
 import shlex
 import shutil
 import tomllib
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from pathlib import Path
 
 import pytest
@@ -170,13 +170,14 @@ def _is_excused(block: Block) -> bool:
     return any(block.text.startswith(beginning) for beginning in NOT_RUN)
 
 
-def quick_and_slow(pages: Iterable[str]) -> list[object]:
-    """Return pages as parameters of a test, those of `SLOW` marked."""
-    return [pytest.param(name, marks=pytest.mark.slow) if name in SLOW else name for name in pages]
+def quick_and_slow(pages: Iterable[str], slow: Collection[str]) -> list[object]:
+    """Return pages as parameters of a test, the slow ones marked."""
+    return [pytest.param(name, marks=pytest.mark.slow) if name in slow else name for name in pages]
 
 
-SLOW = {"CONTRIBUTING.md", "docs/look.md", "docs/robot_arm.md", "docs/tutorial.md"}
-"""Pages that take longer than some seconds."""
+SLOW_PROGRAMS = {"README.md", "CONTRIBUTING.md", "docs/look.md"}
+SLOW_SCRIPTS = {"docs/robot_arm.md", "docs/tutorial.md", "docs/your_robot.md"}
+"""Pages whose Python blocks, or whose commands, take longer than some seconds."""
 PROGRAMS: dict[str, Callable[[Path], None]] = {
     "README.md": nothing,
     "CONTRIBUTING.md": nothing,
@@ -188,7 +189,7 @@ PROGRAMS: dict[str, Callable[[Path], None]] = {
 """Page → what writes the files that its Python blocks read."""
 
 
-@pytest.mark.parametrize("name", quick_and_slow(PROGRAMS))
+@pytest.mark.parametrize("name", quick_and_slow(PROGRAMS, SLOW_PROGRAMS))
 def test_python_runs(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     PROGRAMS[name](tmp_path)
     monkeypatch.chdir(tmp_path)
@@ -209,7 +210,7 @@ SCRIPTS: dict[str, Callable[[Path], None]] = {
 """Page → what writes the files that its commands read."""
 
 
-@pytest.mark.parametrize("name", quick_and_slow(SCRIPTS))
+@pytest.mark.parametrize("name", quick_and_slow(SCRIPTS, SLOW_SCRIPTS))
 def test_commands_print_what_the_page_shows(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
 ) -> None:

@@ -50,6 +50,7 @@ def test_a_drift_is_found_beside_friction():
     assert found["drift@load_cell"].unit == "N/s"
 
 
+@pytest.mark.slow
 def test_without_drift_none_is_named():
     answer = rigtwin.diagnose(bench(0.0, 25.0), machine="damper-bench")
     assert {str(each.name) for each in answer.effects} == {"viscous@damper", "coulomb@damper"}

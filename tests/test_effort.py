@@ -50,6 +50,7 @@ def test_a_prediction_costs_its_integration_steps(recording: Path):
     assert evidence.effort.share == pytest.approx(1.5 * model.effort)
 
 
+@pytest.mark.slow
 def test_a_search_that_ends_early_says_so_and_gives_the_same_answer_again(recording: Path):
     first, second = (diagnosed(recording, 0.02) for _ in range(2))
     assert any(note.startswith(CUT) for note in first.answer.notes)

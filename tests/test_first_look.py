@@ -44,6 +44,7 @@ def test_where_nothing_is_there_is_no_suspect():
     assert str(look).startswith("no significant gap")
 
 
+@pytest.mark.slow
 def test_the_command_says_it_before_the_answer(capfd, tmp_path):
     from rigtwin.cli import main
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import functools
 import itertools
 import re
 from collections import defaultdict
@@ -28,9 +29,9 @@ PUBLIC_TWICE = {"Recording"}
 """`rigtwin.Recording` adds what people call to the recording that all modules read."""
 
 
-def trees() -> Iterator[tuple[Path, ast.Module]]:
-    for path in SOURCES:
-        yield path.relative_to(ROOT), ast.parse(path.read_text())
+@functools.cache
+def trees() -> list[tuple[Path, ast.Module]]:
+    return [(path.relative_to(ROOT), ast.parse(path.read_text())) for path in SOURCES]
 
 
 def bound_names(tree: ast.Module) -> Iterator[str]:

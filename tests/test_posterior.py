@@ -20,7 +20,7 @@ PIECES, SAMPLES = np.array([[[100.0]]]), np.array([[[400.0]]])
 
 @pytest.fixture(scope="module")
 def damped():
-    return explain(evidence_of(recorded("imposed", ("viscous@rail=300",), 6.0)))
+    return explain(evidence_of(recorded("imposed", ("viscous@rail=300",), 3.0)))
 
 
 def density(level: float) -> float:

@@ -41,6 +41,7 @@ def test_the_rigs_controller_commands_what_the_referees_does(test):
     assert np.allclose(ran.measurements, sensors, rtol=0.0, atol=[1e-9, 1e-5, 1e-5, 0.2])
 
 
+@pytest.mark.slow
 def test_without_a_defect_the_force_error_equals_the_twins_to_5_percent():
     """Two plants, two codes: the force error of chapter 4's test."""
     experiment = find("friction-road")

@@ -75,6 +75,7 @@ def test_the_delay_of_a_shifted_signal_is_its_shift():
     np.testing.assert_allclose(identical, 0.0, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_with_a_perfect_actuator_the_error_of_the_late_force_remains():
     criteria = ideal_test(CASES[1], ground_motion("elcentro"))
     assert criteria.j2 == 0.0

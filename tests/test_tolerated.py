@@ -10,6 +10,7 @@ from referee.wild_recordings import WildData
 from referee.withheld import answer_question
 
 
+@pytest.mark.slow
 def test_a_deviation_at_the_end_of_its_tolerance_is_said_and_is_no_residual() -> None:
     # Coulomb friction at both joints: the elbow's is 6.6 % too large, and declared to 5 %.
     case = draw_arm(2, 901)

@@ -84,6 +84,7 @@ def diagnosed(folder: Path, forward: float, backward: float, nominal: str) -> ri
 NOMINAL = pytest.mark.parametrize("nominal", ["known", pytest.param("rough", marks=SLOW)])
 
 
+@pytest.mark.slow
 @NOMINAL
 def test_one_that_differs_by_direction_is_found(tmp_path, nominal):
     answer = diagnosed(tmp_path, 0.08, 0.02, nominal)

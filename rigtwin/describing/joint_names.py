@@ -137,26 +137,31 @@ def read_abbreviations(
 def _distinctive_words(joints: Sequence[str], aliases: Sequence[Alias]) -> list[tuple[str, str]]:
     """Joints, and the words of their own names that no alias of another joint contains.
 
-    A word such as motor, which names parts of any joint, counts where the name has no other: of
-    motor_shaft beside load_shaft.
+    A word such as motor, which names parts of any joint, counts where the name has no other, as of
+    motor_shaft beside load_shaft, or where another joint has no other name, as link_joint.
     """
     vocabulary = {
         joint: {word for alias in aliases if alias.joint == joint for word in alias.words}
         for joint in joints
     }
     plain = QUANTITY_WORDS | MEASURED | COMMANDED | COORDINATES
-    found: list[tuple[str, str]] = []
-    for joint in joints:
-        own = [
+    distinctive = {
+        joint: [
             word
             for word in split_words(joint)
             if len(word) >= SHORTEST_WORD
             and not word.isdigit()
             and not any(word in vocabulary[other] for other in joints if other != joint)
         ]
-        telling = [word for word in own if word not in plain]
-        found += [(joint, word) for word in telling or own if word not in COMMANDED]
-    return found
+        for joint in joints
+    }
+    is_plain = any(words and plain.issuperset(words) for words in distinctive.values())
+    return [
+        (joint, word)
+        for joint, words in distinctive.items()
+        for word in words
+        if word not in COMMANDED and (word not in plain or is_plain)
+    ]
 
 
 def _forms(name: str, shared: frozenset[str]) -> list[tuple[str, ...]]:

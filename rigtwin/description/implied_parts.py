@@ -18,6 +18,7 @@ from rigtwin.description.mechanism import Mechanism
 FREE = [
     "coulomb",
     "viscous",
+    "drag",
     "offset",
     "stiffness",
     "stribeck",

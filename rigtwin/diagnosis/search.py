@@ -39,7 +39,7 @@ from rigtwin.diagnosis.minima import leave_minimum
 from rigtwin.diagnosis.posterior import HypothesisPosterior
 from rigtwin.diagnosis.prices import RARE
 from rigtwin.diagnosis.proposals import choose_distinct, propose_additions, propose_replacements
-from rigtwin.diagnosis.regulars import choose_regulars, fit_together, start_balanced
+from rigtwin.diagnosis.regulars import choose_regulars, fit_together, start_balanced, start_wave
 from rigtwin.diagnosis.rescaling import start_rescaled
 from rigtwin.diagnosis.scoring import Scored, Scorer
 from rigtwin.diagnosis.starts import (
@@ -568,6 +568,7 @@ class HypothesisSearch:
         starts = [start for restart in restarts for start in restart]
         for fit in leaders[:1]:
             starts += start_elsewhere(coarse, fit, self._searched, known)
+            starts += start_wave(coarse, fit, self.effects)
         self._keep(self._refine(starts))
         for fit in self._choose_beginnings():
             self._extend(fit)
