@@ -12,9 +12,6 @@ import pytest
 import rigtwin
 from rigtwin.describing.described import Described
 from rigtwin.describing.other_view import VIEWS, describe_otherwise
-from rigtwin.diagnosis.balance import balance_wave
-from rigtwin.diagnosis.evidence import Evidence
-from rigtwin.diagnosis.fitter import Fitter
 from rigtwin.numerics.arrays import Array
 from tests.helpers.logs import write_log
 
@@ -63,20 +60,6 @@ def test_cogging_that_no_simulation_follows_is_found_along_the_motion(tmp_path: 
     assert finding.parameters["cogging"].value == pytest.approx(COGGING, rel=0.05)
     assert finding.parameters["cogging_pitch"].value == pytest.approx(PITCH, rel=0.01)
     assert "judged by the forces along the measured motion" in answer.answer.notes[0]
-
-
-def test_the_force_along_the_motion_shows_a_waves_pitch_and_phase(tmp_path: Path) -> None:
-    described = describe(tmp_path, follow(COGGING, 5))
-    machine, recording = described.machine, described.record()
-    evidence = Evidence(machine, [recording], [machine.configuration_of(recording)])
-    fitter = Fitter(evidence)
-    wave = next(effect for effect in machine.effects() if str(effect.name) == "cogging@axis")
-    values = balance_wave(fitter, fitter.nominal_fit, wave)
-    assert values is not None
-    amplitude, pitch, phase = values[-1]
-    assert amplitude == pytest.approx(COGGING, rel=0.05)
-    assert pitch == pytest.approx(PITCH, rel=0.01)
-    assert phase == pytest.approx(PHASE, abs=0.1)
 
 
 @pytest.mark.parametrize("gear", [1.0, 2.5])

@@ -85,7 +85,8 @@ def look_otherwise(
         return diagnosis
     if diagnosis.verdict == "no gap":
         return _judge_drives(diagnosis, data, thresholds, progress)
-    for attempt in _attempts(data, _closed_share(diagnosis)):
+    closed = _closed_share(diagnosis)
+    for attempt in _attempts(data, closed):
         other = find_reasons(
             attempt.data.machine,
             attempt.data.recordings,
@@ -97,10 +98,11 @@ def look_otherwise(
         )
         if other.verdict == "no gap" and _names_force_sensor(diagnosis, data.machine):
             continue
-        if other.verdict != "unusable" and _closed_share(other) >= attempt.least:
+        least = attempt.least if closed == 1.0 else max(attempt.least, closed)
+        if other.verdict != "unusable" and _closed_share(other) >= least:
             # Of two explanations the one with fewer effects is given.
             simpler = len(other.effects) < len(diagnosis.effects)
-            if simpler or _closed_share(diagnosis) < 1.0:
+            if simpler or closed < 1.0:
                 return _with_note(other, diagnosis, attempt.reason)
     return diagnosis
 

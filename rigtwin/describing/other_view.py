@@ -27,9 +27,9 @@ from rigtwin.description.joint_elements import actuator_on
 from rigtwin.description.mechanism import Mechanism
 from rigtwin.errors import RigtwinError
 
-MOST = 0.5
-"""Share of the gap that an answer along the measured motion must close to be taken, and that an
-answer by forces must fall short of to be doubted."""
+MOST, ENOUGH = 0.5, 0.8
+"""Share of the gap that an answer along the measured motion must close to be taken, and share that
+an answer by forces must close not to be doubted, as that of an answer that explains the gap."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ VIEWS = {
     FORCES: (
         OtherView(
             INVERSE,
-            MOST,
+            ENOUGH,
             MOST,
             "judged by the forces along the measured motion, as the motion predicted from the "
             "forces departs from the measured one",

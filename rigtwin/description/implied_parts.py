@@ -67,9 +67,19 @@ def add_free_joints(
     """Add the effects and links of coupled joints whose motion follows from forces."""
     for joint in joints:
         tables[identifier(joint)]["effects"] = FREE
-    # Without a force from an actuator, only ratios of friction and masses to one of the masses can
-    # be seen. One known force is enough, since coupled joints pass it on.
-    add_links(mechanism, joints[1:] if free else joints, ["mass", "payload"], tables)
+    # Without a known force, only ratios of friction and masses to one of the masses can be seen.
+    # One force of an actuator or a spring is enough, since coupled joints pass it on.
+    unknown = free and not _has_spring(mechanism, joints)
+    add_links(mechanism, joints[1:] if unknown else joints, ["mass", "payload"], tables)
+
+
+def _has_spring(mechanism: Mechanism, joints: Sequence[str]) -> bool:
+    """Return whether the model states the stiffness of a spring at these joints or between them."""
+    springs = [("joint", joint) for joint in joints]
+    for tendon in mechanism.names("tendon"):
+        if {joint for joint, _ in mechanism.acts_on("tendon", tendon)} <= set(joints):
+            springs.append(("tendon", tendon))
+    return any(mechanism.friction(*spring)["stiffness"] for spring in springs)
 
 
 def sensor_table(mechanism: Mechanism, joint: str, measured: str) -> dict[str, Any]:

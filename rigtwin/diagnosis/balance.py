@@ -13,65 +13,13 @@ model [Gautier, Khalil, IEEE Trans. Robot. Autom. 8 (1992) 368].
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
 
 from rigtwin.components import Effect
-from rigtwin.diagnosis.fit import Fit, Values, with_values
+from rigtwin.diagnosis.fit import Values, with_values
 from rigtwin.diagnosis.fitter import Fitter
-from rigtwin.numerics.arrays import Array
-
-PITCHES = 400
-"""Number of pitches of a wave along the stroke at which it is looked for in the missing force."""
-
-
-def balance_wave(fitter: Fitter, leader: Fit, wave: Effect) -> Values | None:
-    """Return the values with which the missing force beside a wave along the stroke is least.
-
-    A motion that is caught in other valleys than the simulated one says little of a wave's pitch,
-    while the force along the measured motion shows it. At each pitch, the force is linear in the
-    sine and the cosine of the wave and nearly so in the effects of the leader.
-
-    Parameters
-    ----------
-    fitter
-        Fitter of the evidence.
-    leader
-        Fit of effects that the machine has as well.
-    wave
-        Effect whose force alternates along the stroke.
-
-    Returns
-    -------
-    tuple or None
-        Values of the leader's effects and of the wave. None where no measured joint moves freely,
-        or the missing force is not finite.
-    """
-    missing = fitter.evidence.missing_force(leader.plant)
-    starts = fitter.starts(wave)
-    if missing is None or starts.bounds is None or not np.isfinite(missing).all():
-        return None
-    size = starts.values[0][0]
-
-    def force(pitch: float, phase: float) -> Array:
-        plant = with_values(leader.plant, [wave], [(size, pitch, phase)])
-        changed = fitter.evidence.missing_force(plant)
-        assert changed is not None
-        return changed - missing
-
-    # Evenly spaced numbers of waves along the stroke resolve all pitches alike.
-    shortest, longest = starts.bounds[1]
-    best = (math.inf, 0.0, np.zeros(2))
-    for pitch in 1.0 / np.linspace(1.0 / longest, 1.0 / shortest, PITCHES):
-        columns = np.stack([force(pitch, 0.0), force(pitch, 0.5 * math.pi)], axis=1)
-        strengths = np.linalg.lstsq(columns, -missing, rcond=None)[0]
-        error = float(np.sum((missing + columns @ strengths) ** 2))
-        best = min(best, (error, float(pitch), strengths), key=lambda entry: entry[0])
-    _, pitch, strengths = best
-    amplitude, phase = size * math.hypot(*strengths), math.atan2(strengths[1], strengths[0])
-    return (*leader.values, (amplitude, pitch, phase))
 
 
 def balance_forces(fitter: Fitter, effects: Sequence[Effect]) -> Values | None:

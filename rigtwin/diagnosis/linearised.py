@@ -74,6 +74,11 @@ class Linearised:
         values = self._split(np.clip(self._values + moves * self._steps, *self._bounds))
         return tuple(values[number] for number in subset)
 
+    @property
+    def misfit(self) -> float:
+        """Misfit with all effects, once they are refitted to the fitter's own evidence."""
+        return self._keep_only(range(len(self._sizes)))[0]
+
     def leave_out_each(self) -> list[Reduced]:
         """Leave out each effect in turn, and refit the others.
 

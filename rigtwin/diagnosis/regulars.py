@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from rigtwin.components import Effect, Guide, measures
-from rigtwin.diagnosis.balance import balance_forces, balance_wave
-from rigtwin.diagnosis.fit import Fit, Values, clashes
+from rigtwin.diagnosis.balance import balance_forces
+from rigtwin.diagnosis.fit import Fit, Values
 from rigtwin.diagnosis.fitter import Fitter, Screened
 from rigtwin.diagnosis.linearised import Linearised
 from rigtwin.diagnosis.starts import GATEWAY, REGULAR, Start
@@ -41,35 +41,6 @@ def start_balanced(fitter: Fitter, effects: Sequence[Effect]) -> list[Start]:
     """
     balanced = balance_forces(fitter, effects)
     return [] if balanced is None else [(tuple(effects), balanced)]
-
-
-def start_wave(fitter: Fitter, leader: Fit, candidates: Sequence[Effect]) -> list[Start]:
-    """Start a force that alternates along the stroke where the measured motion shows it.
-
-    Parameters
-    ----------
-    fitter
-        Fitter of the evidence.
-    leader
-        Fit to which the wave is added.
-    candidates
-        Candidate effects.
-
-    Returns
-    -------
-    list of Start
-        The leader's effects and a wave, for each guide that may have one. Empty where no joint
-        moves freely.
-    """
-    starts: list[Start] = []
-    for effect in candidates:
-        waves = fitter.starts(effect).quadrature and effect.of is Guide
-        if not waves or effect in leader.effects or clashes(effect, leader.effects):
-            continue
-        values = balance_wave(fitter, leader, effect)
-        if values is not None:
-            starts.append(((*leader.effects, effect), values))
-    return starts
 
 
 def choose_regulars(

@@ -39,7 +39,7 @@ from rigtwin.diagnosis.minima import leave_minimum
 from rigtwin.diagnosis.posterior import HypothesisPosterior
 from rigtwin.diagnosis.prices import RARE
 from rigtwin.diagnosis.proposals import choose_distinct, propose_additions, propose_replacements
-from rigtwin.diagnosis.regulars import choose_regulars, fit_together, start_balanced, start_wave
+from rigtwin.diagnosis.regulars import choose_regulars, fit_together, start_balanced
 from rigtwin.diagnosis.rescaling import start_rescaled
 from rigtwin.diagnosis.scoring import Scored, Scorer
 from rigtwin.diagnosis.starts import (
@@ -470,9 +470,11 @@ class HypothesisSearch:
         """Return a hypothesis without each effect that may be worth less than its price."""
         if len(fit.effects) < 2:
             return []
-        # An effect that is missed by far more than its price need not be left out in a fit.
-        most = fit.misfit + MISSED * 2.0 * self.posterior.prices.ordinary
-        reduced = self._linearise(fit).leave_out_each()
+        linearised = self._linearise(fit)
+        # An effect that is missed by far more than its price need not be left out in a fit. The
+        # misfit of the fit itself may be that on fine evidence.
+        most = linearised.misfit + MISSED * 2.0 * self.posterior.prices.ordinary
+        reduced = linearised.leave_out_each()
         return [(rest, values) for misfit, rest, values in reduced if misfit < most]
 
     def _reduce_closest(self) -> None:
@@ -568,7 +570,6 @@ class HypothesisSearch:
         starts = [start for restart in restarts for start in restart]
         for fit in leaders[:1]:
             starts += start_elsewhere(coarse, fit, self._searched, known)
-            starts += start_wave(coarse, fit, self.effects)
         self._keep(self._refine(starts))
         for fit in self._choose_beginnings():
             self._extend(fit)

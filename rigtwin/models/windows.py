@@ -23,6 +23,8 @@ GROWN = 15.0
 """Largest growth of an initial error within a window. A pendulum that swings regularly reaches 10
 within tens of periods; chaos multiplies errors by e several times a second, and beyond this growth
 a fitted state depends on its data too nonlinearly."""
+STEADY = 1.5
+"""Growth up to which an initial error is corrected once."""
 SHORTEST, FEWEST = 0.15, 40
 """Shortest window: time, s, and number of ticks. Each window costs two unknowns per joint."""
 
@@ -173,13 +175,13 @@ class WindowStarts:
     def _move(self, plant: Plant, key: Hashable, sense: Sense) -> tuple[Array, Array]:
         """Return the states that a prediction starts from, and how far they are from those read.
 
-        The distances are in standard errors, shape (windows, unknowns). One window alone is
-        predicted from its state as read. Where errors grow, one correction is not enough, so that
-        the states are moved by a first one.
+        The distances are in standard errors, shape (windows, unknowns). A single window whose
+        errors do not grow is predicted from its state as read. Where they grow, one correction to
+        first order leaves an error that an effect would explain: so the states are moved by a first
+        correction, and the prediction from there is corrected again.
         """
-        if len(self.windows) == 1:
-            read = self._read(plant)
-            return read, np.zeros((1, 2 * self.windows[0].state.loose))
+        if len(self.windows) == 1 and self.windows[0].state.growth <= STEADY:
+            return self._read(plant), np.zeros((1, 2 * self.windows[0].state.loose))
 
         def move() -> tuple[Array, Array]:
             moved = [
