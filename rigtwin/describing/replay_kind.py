@@ -80,7 +80,6 @@ def choose_kind(
     """
     if stated:
         return ReplayKind(_read_stated(stated), "as stated")
-    positions = [j for j in joints if _takes_position(mechanism, j)]
     commanded = slots.joints(JointQuantity.COMMAND, joints)
     if by_servos and placed:
         return ReplayKind(SERVOS, "the measured forces are those of the model's servos")
@@ -89,7 +88,7 @@ def choose_kind(
         beside = " (position commands are there too: --test servos)" if commanded else ""
         return ReplayKind(INVERSE, f"the force at every joint was measured{beside}")
     # Every command goes to an actuator that takes a position.
-    if commanded and set(commanded) <= set(positions) and placed:
+    if commanded and placed and all(_takes_position(mechanism, joint) for joint in commanded):
         return _position_test(mechanism, commanded)
     pushed = [joint for joint in joints if _is_pushed(mechanism, slots, joint, (*measured, *still))]
     # Joints without an actuator move freely; all others must be pushed by something known.
@@ -100,9 +99,8 @@ def choose_kind(
             return ReplayKind(FORCES, "the actuators' commands are in the log")
         # Small errors of the forces make the predicted motion of an arm run away.
         if placed and len(pushed) == len(joints) > 1 and are_coupled(mechanism, joints):
-            return ReplayKind(
-                INVERSE, "the actuators take forces, and those of every joint are in the log"
-            )
+            why = "the actuators take forces, and those of every joint are in the log"
+            return ReplayKind(INVERSE, why)
         return ReplayKind(FORCES, "the actuators take forces, and those are in the log")
     raise _question(mechanism, joints, measured, commanded)
 

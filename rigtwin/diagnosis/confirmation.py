@@ -14,6 +14,7 @@ from rigtwin.diagnosis.fit import Fit, is_possible, leave_one_out
 from rigtwin.diagnosis.fitter import Fitter
 from rigtwin.diagnosis.posterior import HypothesisPosterior
 from rigtwin.diagnosis.scoring import Scorer
+from rigtwin.diagnosis.starts import Start
 from rigtwin.diagnosis.threads import Threads
 from rigtwin.diagnosis.thresholds import Thresholds
 from rigtwin.diagnosis.tolerance_refit import PERTURBATIONS, refit_with_tolerances
@@ -77,12 +78,7 @@ def confirm(
     fits = [current]
     most = HOPELESS * max(fit.misfit, current.misfit)
     while len(current.effects) > 1 and current.misfit <= NEAR_NOISE * evidence.expected:
-        starts = [
-            (effects, values)
-            for _, effects, values in leave_one_out(current)
-            if is_possible(effects, fitter.plant)
-        ]
-        rough = threads.map(lambda start: coarse.refine(*start), starts)
+        rough = threads.map(lambda start: coarse.refine(*start), _leave_out(current, fitter))
         reduced = threads.map(
             lambda fewer: refit_with_tolerances(
                 fitter, fitter.refine(fewer.effects, fewer.values), ()
@@ -103,6 +99,12 @@ def confirm(
         pool = [each for each in pool if each.fit is not best] + [scorer.score(better)]
         posterior = HypothesisPosterior(pool, fitter, candidates, thresholds)
     return Confirmation(posterior.best.fit, not posterior.has_unexplained_residual)
+
+
+def _leave_out(fit: Fit, fitter: Fitter) -> list[Start]:
+    """Return a fit's effects and values without each effect that the others can do without."""
+    reduced = [(effects, values) for _, effects, values in leave_one_out(fit)]
+    return [start for start in reduced if is_possible(start[0], fitter.plant)]
 
 
 def _fit_again(fitter: Fitter, posterior: HypothesisPosterior) -> Fit | None:
