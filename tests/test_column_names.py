@@ -192,6 +192,15 @@ def test_a_general_word_counts_where_another_joint_has_no_other_name(tmp_path: P
     assert known["motor_shaft.command"] == "cmd_motor"
 
 
+def test_columns_that_count_from_zero_mean_places_and_not_the_models_names(tmp_path: Path) -> None:
+    model = LEG.replace('name="p1"', 'name="effort1"').replace('name="p2"', 'name="effort2"')
+    columns = {f"position{place} [rad]": SWING for place in range(2)}
+    columns |= {"effort0": 0.1 * ACCELERATION, "effort1": 0.04 * ACCELERATION}
+    known = sources(tmp_path, model, columns)
+    assert known["hip_pitch.force"] == "effort0"
+    assert known["knee.force"] == "effort1"
+
+
 def test_a_moment_about_an_axis_is_a_joints_force_beside_its_name_alone(tmp_path: Path) -> None:
     columns = {"shaft_pos": SWING, "Mz_shaft": INERTIA * ACCELERATION, "mx": SWING, "temps": TIME}
     assert sources(tmp_path, SHAFT, columns)["shaft.force"] == "Mz_shaft"

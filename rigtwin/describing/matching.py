@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -10,6 +9,12 @@ import numpy as np
 from rigtwin.describing.heading import read_words, split_words, stated_unit
 from rigtwin.describing.joint_names import QUANTITY_WORDS, Alias, list_aliases, read_abbreviations
 from rigtwin.describing.match import NUMBERED, REMAINING, UNNAMED, Match
+from rigtwin.describing.numbered_columns import (
+    counted_from_zero,
+    families_of,
+    number_of,
+    order_joints,
+)
 from rigtwin.describing.quantity import ANGULAR, AXIAL, COORDINATES, MEASURED, JointQuantity
 from rigtwin.describing.question import enumerate_names
 from rigtwin.describing.stacked_states import split_state
@@ -47,10 +52,18 @@ def match_columns(
     numbered: dict[str, tuple[str, ...]] = {}
     headings = {name: split_words(name) for name in _distinct(columns) if name not in skipped}
     abbreviated = read_abbreviations(list(headings.values()), aliases)
-    for column, heading in headings.items():
-        words = tuple(abbreviated.get(word, word) for word in heading)
+    written = {
+        column: tuple(abbreviated.get(word, word) for word in heading)
+        for column, heading in headings.items()
+    }
+    by_alias = {
+        column: _by_alias(column, words, columns.units.get(column, ""), aliases)
+        for column, words in written.items()
+    }
+    counted = counted_from_zero(written, by_alias, len(joints))
+    for column, words in written.items():
         unit = columns.units.get(column, "")
-        named = _by_alias(column, words, unit, aliases)
+        named = [] if column in counted else by_alias[column]
         if len(named) == 1:
             matches += named
         elif named:
@@ -63,8 +76,8 @@ def match_columns(
             matches.append(match)
         else:
             unused[column] = UNNAMED
-    for family in _families(numbered).values():
-        ordered = sorted(family, key=lambda column: _number(numbered[column]))
+    for family in families_of(numbered).values():
+        ordered = sorted(family, key=lambda column: number_of(numbered[column]))
         state = split_state(ordered, columns.values, joints)
         matched, reason = (
             (state, "") if state else _by_number(family, numbered, columns.units, joints)
@@ -222,16 +235,6 @@ def _varies(values: Array) -> bool:
     return len(numbers) > 0 and float(np.ptp(numbers)) > 0.0
 
 
-def _families(numbered: Mapping[str, tuple[str, ...]]) -> dict[str, list[str]]:
-    """Columns whose names differ by a number only."""
-    families: dict[str, list[str]] = {}
-    for column in numbered:
-        # Only a whole family shows how its numbers count: from 0, from 1, or as the joints' names
-        # do.
-        families.setdefault(re.sub(r"\d+", "#", column), []).append(column)
-    return families
-
-
 def _by_number(
     family: Sequence[str],
     numbered: Mapping[str, tuple[str, ...]],
@@ -239,9 +242,9 @@ def _by_number(
     joints: Sequence[str],
 ) -> tuple[list[Match], str]:
     """Columns numbered in the order of the joints, or as the joints' own names are."""
-    numbers = {column: _number(numbered[column]) for column in family}
+    numbers = {column: number_of(numbered[column]) for column in family}
     # The family is numbered as a whole, so one column more or less than joints fits none.
-    order = _order(sorted(numbers.values()), joints)
+    order = order_joints(sorted(numbers.values()), joints)
     first = family[0]
     rest = tuple(word for word in numbered[first] if not word.isdigit())
     meaning = read_words(rest, units.get(first, ""))
@@ -257,23 +260,3 @@ def _by_number(
     return [
         Match(column, order[number], quantity, NUMBERED, rank) for column, number in numbers.items()
     ], ""
-
-
-def _number(words: Sequence[str]) -> int:
-    return next(int(word) for word in words if word.isdigit())
-
-
-def _order(numbers: Sequence[int], joints: Sequence[str]) -> dict[int, str] | None:
-    """Number of a column → joint; None if there are not as many joints."""
-    # Numbers in the joints' own names mean more than the order of the joints.
-    digits = [[int(w) for w in split_words(joint) if w.isdigit()] for joint in joints]
-    if all(len(each) == 1 for each in digits):
-        by_name = {each[0]: joint for each, joint in zip(digits, joints, strict=True)}
-        if len(by_name) == len(joints) and set(numbers) <= set(by_name):
-            return by_name
-    if len(numbers) != len(joints) or list(numbers) not in (
-        list(range(len(joints))),
-        list(range(1, len(joints) + 1)),
-    ):
-        return None
-    return dict(zip(numbers, joints, strict=True))
