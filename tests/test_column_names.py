@@ -173,23 +173,16 @@ def test_what_the_joint_does_is_read_behind_the_gear(
     assert recording["/sensor.load_enc"] == pytest.approx(SWING, abs=1e-6)
 
 
-def test_a_general_word_identifies_a_joint_without_another(tmp_path: Path) -> None:
-    model = LEG.replace("hip_pitch", "motor_shaft").replace("knee", "load_shaft")
-    columns = {"motor angle [rad]": SWING, "load angle [rad]": SWING}
-    columns |= {"motor_shaft_cmd": SWING, "load_shaft_cmd": SWING}
+@pytest.mark.parametrize(("other", "word"), [("load_shaft", "load"), ("link_joint", "link")])
+def test_a_general_word_identifies_a_joint_without_another(
+    tmp_path: Path, other: str, word: str
+) -> None:
+    model = LEG.replace("hip_pitch", "motor_shaft").replace("knee", other)
+    columns = {"motor angle [rad]": SWING, f"{word} angle [rad]": SWING}
+    columns |= {"motor_shaft_cmd": SWING, f"{other}_cmd": SWING}
     known = sources(tmp_path, model, columns)
     assert known["motor_shaft.position"] == "motor angle"
-    assert known["load_shaft.position"] == "load angle"
-
-
-def test_a_general_word_counts_where_another_joint_has_no_other_name(tmp_path: Path) -> None:
-    model = LEG.replace("hip_pitch", "motor_shaft").replace("knee", "link_joint")
-    columns = {"enc_motor [rad]": SWING, "enc_link [rad]": SWING}
-    columns |= {"cmd_motor [rad]": SWING, "cmd_link [rad]": SWING}
-    known = sources(tmp_path, model, columns)
-    assert known["motor_shaft.position"] == "enc_motor"
-    assert known["link_joint.position"] == "enc_link"
-    assert known["motor_shaft.command"] == "cmd_motor"
+    assert known[f"{other}.position"] == f"{word} angle"
 
 
 def test_columns_that_count_from_zero_mean_places_and_not_the_models_names(tmp_path: Path) -> None:

@@ -56,14 +56,9 @@ def match_columns(
         column: tuple(abbreviated.get(word, word) for word in heading)
         for column, heading in headings.items()
     }
-    by_alias = {
-        column: _by_alias(column, words, columns.units.get(column, ""), aliases)
-        for column, words in written.items()
-    }
-    counted = counted_from_zero(written, by_alias, len(joints))
+    by_name = _match_names(written, columns, aliases, len(joints))
     for column, words in written.items():
-        unit = columns.units.get(column, "")
-        named = [] if column in counted else by_alias[column]
+        unit, named = columns.units.get(column, ""), by_name[column]
         if len(named) == 1:
             matches += named
         elif named:
@@ -102,6 +97,20 @@ def _distinct(columns: Columns) -> list[str]:
         if known is None or len(name) < len(known):
             names[id(values)] = name
     return [name for name in columns.values if name in set(names.values())]
+
+
+def _match_names(
+    written: Mapping[str, tuple[str, ...]],
+    columns: Columns,
+    aliases: Sequence[Alias],
+    joints: int,
+) -> dict[str, list[Match]]:
+    """Column → its best matches by a name of the model; none where its number is a place."""
+    by_alias = {
+        column: _by_alias(column, words, columns.units.get(column, ""), aliases)
+        for column, words in written.items()
+    }
+    return by_alias | {column: [] for column in counted_from_zero(written, by_alias, joints)}
 
 
 def _by_alias(
