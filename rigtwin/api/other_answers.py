@@ -98,6 +98,7 @@ def look_otherwise(
         )
         if other.verdict == "no gap" and _names_force_sensor(diagnosis, data.machine):
             continue
+        # Of two answers that leave a part of the gap, the one that closes more of it is given.
         least = attempt.least if closed == 1.0 else max(attempt.least, closed)
         if other.verdict != "unusable" and _closed_share(other) >= least:
             # Of two explanations the one with fewer effects is given.

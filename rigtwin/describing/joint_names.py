@@ -155,12 +155,12 @@ def _distinctive_words(joints: Sequence[str], aliases: Sequence[Alias]) -> list[
         ]
         for joint in joints
     }
-    is_plain = any(words and plain.issuperset(words) for words in distinctive.values())
+    plain_counts = any(words and plain.issuperset(words) for words in distinctive.values())
     return [
         (joint, word)
         for joint, words in distinctive.items()
         for word in words
-        if word not in COMMANDED and (word not in plain or is_plain)
+        if word not in COMMANDED and (word not in plain or plain_counts)
     ]
 
 

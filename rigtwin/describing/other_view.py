@@ -27,9 +27,12 @@ from rigtwin.description.joint_elements import actuator_on
 from rigtwin.description.mechanism import Mechanism
 from rigtwin.errors import RigtwinError
 
-MOST, ENOUGH = 0.5, 0.8
-"""Share of the gap that an answer along the measured motion must close to be taken, and share that
-an answer by forces must close not to be doubted, as that of an answer that explains the gap."""
+MOST = 0.5
+"""Least share of the gap that an answer in another view must close to take the place of the first
+answer. Forces that are taken as measured are doubted below the same share."""
+ENOUGH = 0.8
+"""Share of the gap from which a motion predicted from forces is not doubted. It is the share that
+an explained gap needs as well."""
 
 
 @dataclass(frozen=True)

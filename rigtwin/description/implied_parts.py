@@ -76,9 +76,7 @@ def add_free_joints(
 def _has_spring(mechanism: Mechanism, joints: Sequence[str]) -> bool:
     """Return whether the model states the stiffness of a spring at these joints or between them."""
     springs = [("joint", joint) for joint in joints]
-    for tendon in mechanism.names("tendon"):
-        if {joint for joint, _ in mechanism.acts_on("tendon", tendon)} <= set(joints):
-            springs.append(("tendon", tendon))
+    springs += [("tendon", tendon) for tendon in _tendons_of(mechanism, joints)]
     return any(mechanism.friction(*spring)["stiffness"] for spring in springs)
 
 
@@ -107,14 +105,23 @@ def add_tendons(
     mechanism: Mechanism, joints: Sequence[str], tables: dict[str, dict[str, Any]]
 ) -> None:
     """Add the fixed tendons that couple joints: by friction, as in a wrist, or by a spring."""
-    for tendon in mechanism.names("tendon"):
-        # A tendon that passes another joint too would see a motion that is not measured.
-        along = [joint for joint, _ in mechanism.acts_on("tendon", tendon)]
-        if along and set(along) <= set(joints):
-            effects = ["coulomb", "viscous"]
-            if mechanism.friction("tendon", tendon)["stiffness"]:
-                effects += ["stiffness", "slack"]
-            tables[identifier(tendon)] = {"tendon": tendon, "effects": effects}
+    for tendon in _tendons_of(mechanism, joints):
+        effects = ["coulomb", "viscous"]
+        if mechanism.friction("tendon", tendon)["stiffness"]:
+            effects += ["stiffness", "slack"]
+        tables[identifier(tendon)] = {"tendon": tendon, "effects": effects}
+
+
+def _tendons_of(mechanism: Mechanism, joints: Sequence[str]) -> list[str]:
+    """Return the fixed tendons that couple these joints and no other joint.
+
+    A tendon that passes another joint too would see a motion that is not measured.
+    """
+    passed = {
+        tendon: {joint for joint, _ in mechanism.acts_on("tendon", tendon)}
+        for tendon in mechanism.names("tendon")
+    }
+    return [tendon for tendon, along in passed.items() if along and along <= set(joints)]
 
 
 def add_rotor(joint: str, tables: dict[str, dict[str, Any]]) -> None:

@@ -102,7 +102,10 @@ def confirm(
 
 
 def _leave_out(fit: Fit, fitter: Fitter) -> list[Start]:
-    """Return a fit's effects and values without each effect that the others can do without."""
+    """Return the other effects of a fit, and their values, for each effect that is left out.
+
+    Sets in which an effect lacks the dry friction that it acts through are omitted.
+    """
     reduced = [(effects, values) for _, effects, values in leave_one_out(fit)]
     return [start for start in reduced if is_possible(start[0], fitter.plant)]
 

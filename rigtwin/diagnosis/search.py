@@ -471,8 +471,8 @@ class HypothesisSearch:
         if len(fit.effects) < 2:
             return []
         linearised = self._linearise(fit)
-        # An effect that is missed by far more than its price need not be left out in a fit. The
-        # misfit of the fit itself may be that on fine evidence.
+        # An effect that is missed by far more than its price need not be left out in a fit. Both
+        # misfits are those on coarse evidence, while `fit.misfit` may be one on fine evidence.
         most = linearised.misfit + MISSED * 2.0 * self.posterior.prices.ordinary
         reduced = linearised.leave_out_each()
         return [(rest, values) for misfit, rest, values in reduced if misfit < most]
