@@ -185,6 +185,11 @@ def test_a_general_word_identifies_a_joint_without_another(
     assert known[f"{other}.position"] == f"{word} angle"
 
 
+def test_a_log_of_the_time_alone_is_said_to_be_one(tmp_path: Path) -> None:
+    with pytest.raises(RigtwinError, match="the log has no other column than the time; say"):
+        sources(tmp_path, SHAFT, {})
+
+
 def test_columns_that_count_from_zero_mean_places_and_not_the_models_names(tmp_path: Path) -> None:
     model = LEG.replace('name="p1"', 'name="effort1"').replace('name="p2"', 'name="effort2"')
     columns = {f"position{place} [rad]": SWING for place in range(2)}

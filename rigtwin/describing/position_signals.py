@@ -39,7 +39,7 @@ def ask_positions(log: Log) -> None:
     refused = "".join(f"; column {name!r}: {why}" for name, why in log.columns.refused.items())
     question = ask(
         f"no column is named as the position of {enumerate_names(joints)}; the log has "
-        f"{enumerate_names(names, 30)}{refused}",
+        f"{enumerate_names(names, 30) or 'no other column than the time'}{refused}",
         option(f"{joints[0]}.position", "COLUMN"),
     )
     log.questions.append(str(question))
