@@ -20,11 +20,12 @@ help:
 
 setup: $(VENV)/.done
 
+# uv takes a fifth of pip's time; pip does it where uv cannot be had or does not reach the index.
 $(VENV)/.done: pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "rigtwin needs Python 3.11 or newer; $(PYTHON) is $$($(PYTHON) -V). Name another: make setup PYTHON=python3.12"; exit 1; }
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/pip install --quiet --upgrade pip
-	$(BIN)/pip install --quiet --editable '.[dev]'
+	-$(BIN)/pip install --quiet --upgrade pip uv
+	VIRTUAL_ENV=$(VENV) $(BIN)/uv pip install --quiet --editable '.[dev]' || $(BIN)/pip install --quiet --editable '.[dev]'
 	@touch $@
 
 system: setup

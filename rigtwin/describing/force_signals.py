@@ -106,6 +106,7 @@ def force_signal(log: Log, joint: str) -> LogSignal | None:
         unit=unit.name,
         why=match.why,
         assumed=(unit.assumed,) if unit.assumed else (),
+        scale=unit.scale,
     )
 
 

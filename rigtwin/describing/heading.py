@@ -7,7 +7,9 @@ from dataclasses import dataclass
 
 from rigtwin.describing.quantity import (
     COMMANDED,
+    COUNTS,
     MEASURED,
+    RATES,
     UNIT_WORDS,
     WORDS,
     JointQuantity,
@@ -20,6 +22,36 @@ GREEK = {"θ": "theta", "τ": "tau", "φ": "phi", "ω": "omega", "ϕ": "phi"}
 """Letters that columns are named by."""
 SHORT = {"th": "theta", "ph": "phi"}
 """Short forms of those letters' names."""
+PREFIXES = {
+    "i": "current",
+    "iq": "iq",
+    "tau": "tau",
+    "trq": "torque",
+    "torque": "torque",
+    "force": "force",
+    "pos": "pos",
+    "vel": "vel",
+    "speed": "speed",
+    "angle": "angle",
+    "theta": "theta",
+    "th": "theta",
+    "omega": "omega",
+}
+"""Beginning of a word → word that it stands for."""
+SUFFIXES = frozenset(["ref", "cmd", "des", "set", "meas", "act", "fb", "target"])
+"""What may follow such a beginning in the same word."""
+UNITS_WITH_CAPITALS = {
+    "N": "newton",
+    "mN": "millinewton",
+    "kN": "kilonewton",
+    "mNm": "mnm",
+    "kNm": "knm",
+    "Ncm": "ncm",
+    "mA": "ma",
+}
+"""Unit whose capitals count → word by which it is known here."""
+_CAPITALS = re.compile(r"(?<=[_\s(\[])(mNm|kNm|Ncm|mN|kN|mA|N)(?=[)\]]?(?:[_\s]\d+)?$)")
+"""Such a unit at the end of a name, before the number of a joint at most."""
 PRECEDENCE = (
     JointQuantity.OTHER,
     JointQuantity.VOLTAGE,
@@ -70,13 +102,21 @@ def split_words(name: str) -> tuple[str, ...]:
     # Spaces about the word: θ1 has the words theta and 1.
     for letter, word in GREEK.items():
         name = name.replace(letter, f" {word} ")
-    # A capital N at the end is the unit: shaker_N has the words shaker, newton.
-    name = re.sub(r"(?<=[_\s(\[])N(?=[)\]]?$)", "newton", name)
-    # Before words are parted at capitals, mA is a word.
-    name = re.sub(r"(?<=[_\s(\[])mA(?=[)\]]?$)", "ma", name)
+    # Before words are parted at capitals, mNm is a word. A capital N at the end is a unit too:
+    # shaker_N has the words shaker, newton.
+    name = _CAPITALS.sub(lambda match: UNITS_WITH_CAPITALS[match[0]], name)
     name = re.sub(r"([a-z])([A-Z])", r"\1 \2", name)
     words: list[str] = re.findall(r"[a-z]+|\d+", name.lower())
-    return tuple(SHORT.get(word, word) for word in words)
+    parts = [part for word in words for part in _part_prefix(word)]
+    return tuple(SHORT.get(word, word) for word in parts)
+
+
+def _part_prefix(word: str) -> tuple[str, ...]:
+    """Return the words of which one is made without a sign between them: iref is i and ref."""
+    for prefix in sorted(PREFIXES, key=len, reverse=True):
+        if word.startswith(prefix) and word[len(prefix) :] in SUFFIXES:
+            return PREFIXES[prefix], word[len(prefix) :]
+    return (word,)
 
 
 def read_words(words: tuple[str, ...], unit: str) -> Meaning:
@@ -94,6 +134,9 @@ def read_words(words: tuple[str, ...], unit: str) -> Meaning:
         words = ("iq", *(word for word in words if word not in ("i", "q")))
     commanded = any(word in COMMANDED for word in words)
     quantity = None
+    if stated_unit(words) in RATES.values():
+        unit = unit or stated_unit(words)
+        words = tuple(word for word in words if word not in ("per", "s"))
     # q_dot and theta dot are derivatives, although q and theta are positions.
     if "dot" in words:
         quantity = JointQuantity.VELOCITY
@@ -107,7 +150,7 @@ def read_words(words: tuple[str, ...], unit: str) -> Meaning:
     elif unit and quantity in SAID_BY_WORDS:
         stated = _quantity_by_unit((), unit)
         quantity = stated if stated in SAID_BY_UNITS else quantity
-    known = COMMANDED | MEASURED | frozenset(UNIT_WORDS) | {"dot", "ddot"}
+    known = COMMANDED | COUNTS | MEASURED | frozenset(UNIT_WORDS) | {"dot", "ddot"}
     known |= frozenset().union(*WORDS.values())
     unknown = tuple(word for word in words if word not in known and not word.isdigit())
     return Meaning(quantity, commanded, unknown)
@@ -129,6 +172,10 @@ def stated_unit(words: tuple[str, ...]) -> str:
     words
         All words of the heading.
     """
+    # A slash is no part of a name that programs accept: vel_deg_s is in deg/s.
+    ends = [word for word in words if not word.isdigit() and word != "per"]
+    if ends[-1:] == ["s"] and ends[-2:-1] and (rate := RATES.get(ends[-2])):
+        return rate
     # The unit stands last, as in position_deg.
     return next((UNIT_WORDS[word] for word in reversed(words) if word in UNIT_WORDS), "")
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from rigtwin.describing.counts import count_unit
 from rigtwin.describing.log import STATED, Log, bridge
 from rigtwin.describing.quantity import JointQuantity
 from rigtwin.describing.question import Question, UnitQuestion, ask, enumerate_names, option
@@ -92,7 +93,7 @@ def position_signals(log: Log, joints: Sequence[str]) -> dict[str, LogSignal] | 
             sign=sign,
             why=why,
             assumed=(*((units[joint].assumed,) if units[joint].assumed else ()), *geared),
-            scale=1.0 / gear,
+            scale=units[joint].scale / gear,
         )
     return {joint: _unwrap(log, signals[joint]) for joint in joints}
 
@@ -127,11 +128,23 @@ def _units(log: Log, columns: dict[str, str]) -> dict[str, Unit] | None:
     if general is not None:
         return dict.fromkeys(columns, Unit(general))
     units: dict[str, Unit] = {}
+    try:
+        for joint, column in columns.items():
+            turns = log.mechanism.turns(joint)
+            unit = count_unit(log.columns, column, turns, f"{joint}.position")
+            units |= {joint: unit} if unit is not None else {}
+    except Question as question:
+        log.questions.append(str(question))
+        return None
     # Slides first: their unit, m or mm, is seldom in doubt.
     for turns in (False, True):
-        alike = {j: column for j, column in columns.items() if log.mechanism.turns(j) is turns}
+        alike = {
+            joint: column
+            for joint, column in columns.items()
+            if log.mechanism.turns(joint) is turns and joint not in units
+        }
         known = {
-            joint: unit_of(unit.name)[1] * bridge(log.columns.values[columns[joint]])
+            joint: unit.factor * bridge(log.columns.values[columns[joint]])
             for joint, unit in units.items()
         }
         common = _units_alike(log, alike, known) if alike else {}

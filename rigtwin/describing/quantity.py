@@ -87,15 +87,25 @@ UNIT_WORDS = {
     "metres": "m",
     "nm": "Nm",
     "mnm": "mNm",
+    "knm": "kNm",
+    "ncm": "Ncm",
     "newton": "N",
+    "millinewton": "mN",
+    "kilonewton": "kN",
     "amp": "A",
     "amps": "A",
     "ma": "mA",
     "rpm": "rpm",
     "dps": "deg/s",
     "rps": "rev/s",
+    "radps": "rad/s",
+    "mmps": "mm/s",
 }
 """Word in a column's name → unit that it states."""
+RATES = {"deg": "deg/s", "rad": "rad/s", "rev": "rev/s", "mm": "mm/s", "cm": "cm/s", "m": "m/s"}
+"""Word before a last word "s" → unit of a velocity that both state."""
+COUNTS = _words("counts ticks pulses")
+"""Words that say that a position is in counts of an encoder."""
 AXIAL = _words("fx fy fz mx my mz")
 """Forces and moments along an axis. Without the name of a joint they may be those of another
 sensor, as mx is of a magnetometer."""

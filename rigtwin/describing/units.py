@@ -12,6 +12,7 @@ import numpy as np
 from rigtwin.describing.heading import split_words, stated_unit
 from rigtwin.describing.quantity import SI, JointQuantity
 from rigtwin.describing.question import UnitQuestion, ask, option
+from rigtwin.description.joint_elements import actuator_on
 from rigtwin.description.mechanism import Mechanism
 from rigtwin.importing.columns import Columns
 from rigtwin.importing.units import is_unit, unit_of
@@ -47,15 +48,18 @@ class Unit:
         Unit as a map has it.
     assumed
         Why it was concluded; empty where the file or its owner states it.
+    scale
+        Factor after conversion to SI, such as that of an actuator's gear.
     """
 
     name: str
     assumed: str = ""
+    scale: float = 1.0
 
     @property
     def factor(self) -> float:
-        """Factor to SI."""
-        return unit_of(self.name)[1]
+        """Factor to the quantity in SI."""
+        return self.scale * unit_of(self.name)[1]
 
 
 def known_unit(columns: Columns, column: str, si: str, key: str) -> Unit | None:
@@ -285,15 +289,31 @@ def force_unit(mechanism: Mechanism, columns: Columns, column: str, joint: str) 
         Column of the force.
     joint
         Joint that the force acts on.
+
+    Returns
+    -------
+    Unit
+        Unit of the column. A hinge may be pushed by a force in N, and a slide by a torque in Nm,
+        through the gear of its actuator, which is then the unit's scale.
     """
     si = SI[JointQuantity.FORCE][mechanism.turns(joint)]
+    other = SI[JointQuantity.FORCE][not mechanism.turns(joint)]
+    written = columns.units.get(column, "") or stated_unit(split_words(column))
+    actuator = actuator_on(mechanism, joint)
+    if is_unit(written) and unit_of(written)[0] == other and actuator is not None:
+        gear = actuator_constant(mechanism, actuator)
+        if gear and not mechanism.positions(actuator):
+            text = f"{written}, times the gear of the model's actuator, {gear:g} {si}/{other}"
+            return Unit(written, text, gear)
     known = known_unit(columns, column, si, f"{joint}.force")
     return known or Unit(si, f"{si}, as nothing states another unit")
 
 
 def actuator_constant(mechanism: Mechanism, actuator: str) -> float:
-    """Force of an actuator for each unit of its control, N or Nm."""
+    """Force of an actuator for each unit of its control, N or Nm, at the first joint it moves."""
     number = mujoco.mj_name2id(mechanism.model, mujoco.mjtObj.mjOBJ_ACTUATOR, actuator)
     model = mechanism.model
     # MuJoCo: force = gear · (gain · control + bias); a motor's bias is zero.
-    return float(model.actuator_gear[number, 0]) * float(model.actuator_gainprm[number, 0])
+    force = float(model.actuator_gear[number, 0]) * float(model.actuator_gainprm[number, 0])
+    moved = mechanism.acts_on("actuator", actuator) if actuator else ()
+    return force * moved[0][1] if moved else force

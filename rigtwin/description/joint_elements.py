@@ -21,11 +21,36 @@ def movable_joints(mechanism: Mechanism) -> list[str]:
 
 
 def actuator_on(mechanism: Mechanism, joint: str) -> str | None:
-    """Return the name of the actuator that acts on a joint alone; None without a named one."""
+    """Return the name of the actuator that acts on a joint; None without a named one.
+
+    A motor that pulls a fixed tendon counts as that of the first joint that the tendon passes.
+    """
     for name in mechanism.names("actuator"):
         if mechanism.joint_of("actuator", name) == joint:
             return name
-    return None
+    pulling = [name for name in _tendon_motors(mechanism) if _passed(mechanism, name)[0] == joint]
+    return pulling[0] if pulling else None
+
+
+def _tendon_motors(mechanism: Mechanism) -> list[str]:
+    """Return the motors on fixed tendons that pass no joint with another actuator."""
+    passed = {name: _passed(mechanism, name) for name in mechanism.names("actuator")}
+    moved = [joint for joints in passed.values() for joint in joints]
+    return [
+        name
+        for name, joints in passed.items()
+        if mechanism.tendon_of("actuator", name) is not None
+        and not mechanism.positions(name)
+        and not mechanism.falls_with_speed(name)
+        and joints
+        # The force at a joint that several actuators move does not follow from one command.
+        and all(moved.count(joint) == 1 for joint in joints)
+    ]
+
+
+def _passed(mechanism: Mechanism, actuator: str) -> list[str]:
+    """Return the joints on which an actuator acts; none if it acts on none linearly."""
+    return [joint for joint, _ in mechanism.acts_on("actuator", actuator)]
 
 
 def sensor_on(mechanism: Mechanism, joint: str, measured: str) -> str | None:

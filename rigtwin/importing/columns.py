@@ -40,6 +40,8 @@ class Columns:
         Name → why the column cannot be read as numbers.
     episode
         Column with the number of the episode; "" if the file holds a single one.
+    remarks
+        Lines of text above the data that are neither names nor units.
     """
 
     values: Mapping[str, Array]
@@ -50,6 +52,7 @@ class Columns:
     listed: tuple[str, ...] = ()
     refused: Mapping[str, str] = field(default_factory=dict)
     episode: str = ""
+    remarks: tuple[str, ...] = ()
 
     @property
     def rows(self) -> int:

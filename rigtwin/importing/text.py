@@ -46,6 +46,8 @@ class Layout:
         Names and units of the columns.
     words
         Places of the columns that hold words.
+    remarks
+        Lines above the names of the columns.
     """
 
     separator: str
@@ -54,6 +56,7 @@ class Layout:
     names: tuple[str, ...]
     units: tuple[str, ...]
     words: frozenset[int] = frozenset()
+    remarks: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -134,7 +137,16 @@ def read_text(path: Path, selection: Selection = EVERYTHING) -> Columns:
     if layout.words:
         form += f"; words in {', '.join(layout.names[place] for place in sorted(layout.words))}"
         refused |= _refuse_words(layout, head[layout.first])
-    return Columns(values, units, form, notes, wrong, listed=tuple(known), refused=refused)
+    return Columns(
+        values,
+        units,
+        form,
+        notes,
+        wrong,
+        listed=tuple(known),
+        refused=refused,
+        remarks=layout.remarks,
+    )
 
 
 def _refuse_words(layout: Layout, line: str) -> dict[str, str]:
@@ -247,7 +259,12 @@ def _read_header(lines: Sequence[str], layout: Layout, columns: int) -> Layout:
         stated = _read_units(above[0], above[1] if len(above) > 1 else ())
         names, units = (above[1], stated) if stated else (above[0], units)
     pairs = [split_unit(name, unit) for name, unit in zip(names, units, strict=True)]
-    return replace(layout, names=tuple(n for n, _ in pairs), units=tuple(u for _, u in pairs))
+    return replace(
+        layout,
+        names=tuple(n for n, _ in pairs),
+        units=tuple(u for _, u in pairs),
+        remarks=tuple(line.strip() for line in lines[: layout.first - len(above)]),
+    )
 
 
 def _read_units(cells: Sequence[str], names: Sequence[str]) -> list[str]:
