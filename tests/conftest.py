@@ -6,6 +6,7 @@ import signal
 
 import pytest
 
+from rigtwin.diagnosis import threads
 from rigtwin.recording import RecordedTest
 from tests.helpers.recordings import EXAMPLE, beginning, shipped
 
@@ -14,8 +15,11 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
-FIRST = ("test_supervised.py", "test_mujoco.py", "test_referee.py", "test_rths.py")
-"""Files that compile the rig, the joints, the referee and the hybrid test. The workers take them
+# Every core has a worker of its own already: a second thread would only take time to change to.
+threads.THREADS = 1
+
+FIRST = ("test_supervised.py", "test_load_friction.py", "test_mujoco.py", "test_referee.py")
+"""Files that compile the rig, coupled joints, single joints and the referee. The workers take them
 one after another, so that each compiles something else and no other file waits for it."""
 
 

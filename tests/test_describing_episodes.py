@@ -54,6 +54,7 @@ def test_each_episode_of_a_log_becomes_a_recording(tmp_path: Path):
     assert [recording.ticks for recording in imported] == list(LENGTHS)
 
 
+@pytest.mark.slow
 def test_a_diagnosis_takes_all_episodes_of_a_log(tmp_path: Path):
     columns = episodes()
     columns["tau2"] = columns["tau2"] + 0.3 * np.tanh(np.gradient(columns["q2"], PERIOD) / 0.01)

@@ -158,6 +158,7 @@ def test_a_correction_that_worsens_held_out_data_is_rejected():
     assert any("rejected" in note for note in outcome.answer.notes)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "effect",
     [

@@ -39,6 +39,7 @@ def swing(folder: Path, lag: float) -> Path:
     return write_log(folder / "log.csv", dict(zip(names, np.array(rows).T, strict=True)))
 
 
+@pytest.mark.slow
 def test_a_lag_of_a_servo_is_found_beside_right_forces(tmp_path: Path) -> None:
     (tmp_path / "blade.xml").write_text(MODEL)
     answer = rigtwin.diagnose(

@@ -36,6 +36,7 @@ def test_a_missing_package_is_named_in_one_line(package):
     assert done.stderr.strip().endswith(f"RigtwinError: {line}")
 
 
+@pytest.mark.slow
 def test_a_diagnosis_needs_none_of_them():
     program = (
         "import sys\n"

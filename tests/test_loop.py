@@ -22,7 +22,7 @@ from rigtwin.simulation.runner import record
 from rigtwin.simulation.trip import Trip
 from rigtwin.simulation.twin import Twin
 
-SHORT = Timing(duration=1.0)
+SHORT = Timing(duration=0.6)
 
 
 def all_of(blocks) -> tuple[np.ndarray, np.ndarray, np.ndarray, Trip]:

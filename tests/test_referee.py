@@ -62,6 +62,7 @@ def test_the_referees_controller_follows_the_recorded_settings(tmp_path):
     assert ControllerReplay(RIG.control, recording, settings).deviation() is None
 
 
+@pytest.mark.slow
 def test_set_valued_and_bristle_friction_agree():
     law, demands = draw_demands("imposed", np.random.default_rng(2))
     commands, _ = run(Truth(), law, demands[:5000], np.random.default_rng(2))

@@ -94,6 +94,7 @@ def test_the_authors_controller_reproduces_their_table(case):
     assert np.all(np.abs(np.array(test.criteria) - published) <= allowed)
 
 
+@pytest.mark.slow
 def test_compiled_code_and_python_give_the_same_command(monkeypatch):
     ground = ground_motion("kobe")[8 * 4096 : 9 * 4096]
     for name in ("kalman-inverse", "adaptive-time-series", "adaptive-model"):
@@ -105,6 +106,7 @@ def test_compiled_code_and_python_give_the_same_command(monkeypatch):
         np.testing.assert_allclose(compiled.command, plain.command, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_test():
     first, repeated, another_seed = (
         rigtwin.rths(2, quake="morgan", plants=2, noise=BENCHMARK, seed=seed)[1]
@@ -114,6 +116,7 @@ def test_the_same_seed_gives_the_same_test():
     assert np.any(first.measured != another_seed.measured)
 
 
+@pytest.mark.slow
 def test_only_a_compensated_actuator_follows_the_building_on_every_plant():
     ground = ground_motion("elcentro")[:SHORT]
     assert run_test(CASES[4], ground, find_compensator("none")).criteria.j2 > 40.0
@@ -136,6 +139,7 @@ def test_an_unknown_name_is_refused_in_one_line(capsys):
         assert error.count("\n") == 1
 
 
+@pytest.mark.slow
 def test_the_command_prints_and_writes_the_criteria(tmp_path, capsys):
     out = tmp_path / "found.json"
     assert main(["rths", "--quake", "morgan", "--plants", "2", "--json", str(out)]) == 0

@@ -54,6 +54,7 @@ def test_a_gap_that_the_model_states_is_no_gap_of_the_twin(folder: Path) -> None
     assert answer.verdict == "no gap"
 
 
+@pytest.mark.slow
 def test_a_hidden_gap_is_found_and_written_into_the_model(folder: Path, tmp_path: Path) -> None:
     answer = rigtwin.diagnose(
         play(folder, 1),

@@ -175,6 +175,7 @@ class TestCriticalLag:
         assert crossing is not None
         assert crossing.time == pytest.approx(0.01, rel=1e-9)
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("model", LOOPS)
     def test_against_routh_and_hurwitz_in_exact_fractions(self, model):
         cars = [
@@ -244,6 +245,7 @@ class TestCriticalDelay:
         assert crossing.frequency == pytest.approx(frequency, rel=1e-9)
         assert crossing.time == pytest.approx(np.arctan2(frequency * b, k) / frequency, rel=1e-9)
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("model", LOOPS)
     def test_against_a_simulation_of_the_delay_differential_equation(self, model):
         cars = [
@@ -260,6 +262,7 @@ class TestCriticalDelay:
             root = rightmost_delay_root(LOOPS[model](car), 1.01 * critical.time)
             assert above == pytest.approx(root.real, rel=0.05)
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("model", LOOPS)
     def test_rightmost_root_by_the_argument_principle(self, model):
         for car in (*drawn(2, seed=7), TABLE_6_2):

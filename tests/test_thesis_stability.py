@@ -86,6 +86,7 @@ def test_tables_of_the_quarter_car(quarter, table, expected):
     assert count_agreeing(of(quarter, table)) == expected
 
 
+@pytest.mark.slow
 def test_the_quarter_car_disagrees_only_with_known_contradictions(quarter):
     assert Counter(where for where, _, _ in disagreeing(quarter)) == {
         "Table 5.6": 2,  # tyre damping
