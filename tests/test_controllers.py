@@ -72,7 +72,7 @@ def test_python_and_compiled_agree(settings):
     controlling = controller(settings, PERIOD)
     plain = fast = initial_state(controlling)
     one = None
-    for measured, demand in stream(200):
+    for measured, demand in stream(100):
         plain, one = update(controlling, plain, measured, demand)
         fast, other = compiled_update(controlling, fast, measured, demand)
         # Modal coordinates of the structure grow without bound under such forces: compared to their

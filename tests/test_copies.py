@@ -10,26 +10,36 @@ import pytest
 import rigtwin
 from rigtwin.diagnosis.copies import digest, drop_copies, refuse_copies
 from rigtwin.errors import RigtwinError
+from rigtwin.recording import RecordedTest
 from tests.helpers.twin import recorded
 
-ONE = recorded("imposed", seconds=2.0)
-COPY = replace(ONE, path=Path("copy.mcap"), time=ONE.time + 5.0)
-OTHER = recorded("imposed", seconds=2.0, seed=9)
+Trio = tuple[RecordedTest, RecordedTest, RecordedTest]
 
 
-def test_a_copy_is_known_by_its_content():
-    assert digest(COPY) == digest(ONE)
-    assert digest(OTHER) != digest(ONE)
+@pytest.fixture(scope="module")
+def trio() -> Trio:
+    """A recording, its copy, and another recording."""
+    one = recorded("imposed", seconds=2.0)
+    copy = replace(one, path=Path("copy.mcap"), time=one.time + 5.0)
+    return one, copy, recorded("imposed", seconds=2.0, seed=9)
 
 
-def test_a_copy_adds_nothing_to_a_fit():
-    kept, notes = drop_copies([ONE, COPY, OTHER, COPY])
-    assert kept == [ONE, OTHER]
+def test_a_copy_is_known_by_its_content(trio: Trio):
+    one, copy, other = trio
+    assert digest(copy) == digest(one)
+    assert digest(other) != digest(one)
+
+
+def test_a_copy_adds_nothing_to_a_fit(trio: Trio):
+    one, copy, other = trio
+    kept, notes = drop_copies([one, copy, other, copy])
+    assert kept == [one, other]
     assert len(notes) == 2
     assert notes[0].startswith("copy.mcap holds the same data as ")
 
 
-def test_a_copy_is_refused_as_held_out_data():
-    refuse_copies([OTHER], [ONE])
+def test_a_copy_is_refused_as_held_out_data(trio: Trio):
+    one, copy, other = trio
+    refuse_copies([other], [one])
     with pytest.raises(RigtwinError, match=r"copy.mcap cannot judge .* the same data as"):
-        rigtwin.diagnose([ONE], held_out=[COPY])
+        rigtwin.diagnose([one], held_out=[copy])

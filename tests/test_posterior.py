@@ -48,7 +48,7 @@ def test_bands_cover_all_lines_once():
 
 
 def test_a_whitened_vector_is_split_into_what_it_was_made_of(damped):
-    evidence = evidence_of(recorded("imposed", (), 6.0))
+    evidence = evidence_of(recorded("imposed", (), 3.0))
     differences = evidence.differences(evidence.plant)
     (expected,) = list(evidence.transforms(differences))
     (found,) = split_transforms(evidence, evidence.whiten(differences))

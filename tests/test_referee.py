@@ -72,6 +72,7 @@ def test_set_valued_and_bristle_friction_agree():
     assert difference[3] < 2.0
 
 
+@pytest.mark.slow
 def test_every_named_defect_is_in_the_library_and_changes_the_rig():
     random = np.random.default_rng(3)
     law, demands = draw_demands("imposed", random)
@@ -122,6 +123,7 @@ def test_a_case_has_the_effects_of_its_sort(sort, count):
     assert entry["test"] in TESTS
 
 
+@pytest.mark.slow
 def test_the_size_of_a_defect_is_its_change_in_units_of_noise():
     law, demands = draw_demands("imposed", np.random.default_rng(2))
     commands, _ = run(Truth(), law, demands[:4000], np.random.default_rng(2))

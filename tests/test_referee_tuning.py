@@ -57,6 +57,7 @@ def test_without_a_defect_the_force_error_equals_the_twins_to_5_percent():
     )
 
 
+@pytest.mark.slow
 def test_a_limit_ends_a_test_on_the_referees_plant():
     configuration = override(Configuration(), {"safety": {"force": 150.0}})
     ran = drive(Truth(), configuration, np.zeros((100, 3)), 0)
