@@ -43,7 +43,9 @@ def folder_machine(folder: Path) -> rigtwin.Machine:
             "/sensor.load_cell",
             marks=pytest.mark.slow,
         ),
-        ("folder", "shake", "coulomb@guide", 6.0, "/sensor.position"),
+        pytest.param(
+            "folder", "shake", "coulomb@guide", 6.0, "/sensor.position", marks=pytest.mark.slow
+        ),
     ],
 )
 def test_the_same_lines_for_every_machine(tmp_path, sort, experiment, effect, magnitude, channel):

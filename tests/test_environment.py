@@ -129,6 +129,7 @@ def test_a_reward_is_what_it_says():
     assert ride.step(ride.rest()).reward == pytest.approx(-cost, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_an_agent_can_do_something_about_it():
     """More skyhook, as preload against the body's velocity, costs less."""
 

@@ -36,6 +36,7 @@ def test_what_is_there_is_among_the_suspects(name, value, sensor):
     assert "suspects" in str(look)
 
 
+@pytest.mark.slow
 def test_where_nothing_is_there_is_no_suspect():
     (look,), answer = looks_at()
     assert answer.verdict == "no gap"

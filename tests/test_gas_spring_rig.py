@@ -22,6 +22,7 @@ def settings_of_the_test() -> Configuration:
     return find("gas-spring").configuration
 
 
+@pytest.mark.slow
 def test_the_ideal_against_solve_ivp():
     configuration = settings_of_the_test()
     spring = configuration.plant.gas_spring

@@ -111,7 +111,7 @@ def test_sorts_have_their_shares():
 @pytest.mark.parametrize(
     ("sort", "count"),
     [
-        ("null", 0),
+        pytest.param("null", 0, marks=pytest.mark.slow),
         pytest.param("single", 1, marks=pytest.mark.slow),
         pytest.param("outside", 1, marks=pytest.mark.slow),
     ],

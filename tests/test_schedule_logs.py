@@ -47,6 +47,7 @@ def moved(warm: float) -> dict[str, Array]:
     }
 
 
+@pytest.mark.slow
 def test_friction_that_follows_a_temperature_is_named_with_its_slope(tmp_path: Path) -> None:
     log = write_log(tmp_path / "log.csv", moved(1.5))
     answer = rigtwin.diagnose(log, machine=write_piston(tmp_path))

@@ -333,7 +333,7 @@ EACH_LINE_BOTH_WAYS = (WIRINGS[0b0101010], WIRINGS[0b1010101])
     "signs",
     [
         *EACH_LINE_BOTH_WAYS,
-        *(pytest.param(signs, marks=pytest.mark.slow) for signs in WIRINGS[4::11]),
+        *(pytest.param(signs, marks=pytest.mark.slow) for signs in WIRINGS[4::22]),
     ],
 )
 def test_every_wrong_sign_is_found(signs):
@@ -415,6 +415,7 @@ def test_zero_and_span():
         set_spans(TABLE, still, {"suspension_lvdt": -0.1})
 
 
+@pytest.mark.slow
 def test_the_check_writes_a_table_that_is_trusted(tmp_path, capsys):
     from rigtwin.hardware.daq.table import require_trust
 
