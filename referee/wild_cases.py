@@ -38,7 +38,7 @@ ACCEPTED: Mapping[str, tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]]
     "steps": ((), (), ("quantisation",)),
     "eccentric": ((), (), ("gain",)),
     "ripple": (("cogging",), ("cogging",), ()),
-    "hardening": (("stiffness", "hardening", "position_force"), (), ()),
+    "hardening": (("stiffness", "cubic_stiffness", "position_force"), (), ()),
     "sag": ((), ("gain", "saturation"), ()),
     "late": ((), ("delay", "lag"), ("delay", "lag")),
     "lagging": ((), ("lag", "two_lags", "delay", "resonance"), ()),

@@ -44,6 +44,33 @@ def fields(model: mujoco.MjModel) -> dict[str, np.ndarray]:
     return {name: value.copy() for name, value in found.items() if isinstance(value, np.ndarray)}
 
 
+def test_polynomials_of_springs_and_dampers_are_read_and_written(tmp_path):
+    described(tmp_path)
+    polynomials = MODEL.replace('stiffness="150"', 'stiffness="150 0 900" damping="6 2.5"')
+    (tmp_path / "bench.xml").write_text(polynomials)
+    (tmp_path / "bench.toml").write_text(TOML)
+    machine = rigtwin.machine(tmp_path / "bench.toml")
+    guide = machine.plant.guide
+    assert (guide.stiffness, guide.cubic_stiffness) == (150.0, 900.0)
+    assert (guide.viscous, guide.drag) == (6.0, 2.5)
+    changes = [Change("guide", "cubic_stiffness", 400.0), Change("guide", "drag", 0.0)]
+    assert write_mjcf(tmp_path / "new.xml", machine, changes) == ()
+    model = mujoco.MjModel.from_xml_path(str(tmp_path / "new.xml"))
+    assert (*model.jnt_stiffness, *model.jnt_stiffnesspoly[0]) == (150.0, 0.0, 400.0)
+    assert (*np.ravel(model.dof_damping), *model.dof_dampingpoly[0]) == (6.0, 0.0, 0.0)
+
+
+def test_what_a_guide_cannot_express_of_a_polynomial_is_said(tmp_path):
+    described(tmp_path)
+    polynomials = MODEL.replace('stiffness="150"', 'stiffness="150 20 900" damping="6 2.5 1"')
+    (tmp_path / "bench.xml").write_text(polynomials)
+    (tmp_path / "bench.toml").write_text(TOML)
+    assert rigtwin.machine(tmp_path / "bench.toml").overlooked == (
+        "joint axis: the quadratic part of its stiffness",
+        "joint axis: the cubic damping",
+    )
+
+
 def test_only_what_is_corrected_changes(machine, tmp_path):
     path = tmp_path / "new.xml"
     changes = [

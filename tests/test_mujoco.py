@@ -31,6 +31,7 @@ SIZES = {
     "viscous": 15.0,
     "stiffness": 240.0,
     "slack": 0.02,
+    "cubic_stiffness": 900.0,
     "stribeck": 3.0,
     "asymmetry": 3.0,
     "backlash": 0.01,
@@ -59,6 +60,7 @@ SIZES = {
 SHAPES = {
     "end_stops": {"stop_damping": 5.0, "stop_low": -0.03, "stop_high": 0.06},
     "slack": {"stiffness": 240.0},
+    "cubic_stiffness": {"stiffness": 240.0},
 }
 """Other parameters of an effect that has none at their nominal values."""
 

@@ -44,7 +44,7 @@ class Guide(NamedTuple):
 
         force        = F_viscous + drag·v·|v| + F_position + F_stop + F_dry
         F_viscous    = (viscous ± ½·viscous_asymmetry)·v, through a first-order lag `relaxation`
-        F_position   = stiffness·t(x − x_rest) + offset
+        F_position   = stiffness·t(x − x_rest) + cubic_stiffness·t(x − x_rest)³ + offset
                        + cogging·sin(2π·x/cogging_pitch + cogging_phase)
                        + Σ_n curve_n·T_n(ξ),  n = 2 … 5
                        + stop_stiffness·s(x)
@@ -95,6 +95,7 @@ class Guide(NamedTuple):
     mount_compliance: Annotated[float, Quantity("m/N", 0.0, 1.0, NONE)] = 0.0
     offset: Annotated[float, Quantity("N", -1e7, 1e7, NONE)] = 0.0
     viscous_asymmetry: Annotated[float, Quantity("Ns/m", -1e9, 1e9, NONE)] = 0.0
+    cubic_stiffness: Annotated[float, Quantity("N/m^3", -1e12, 1e12, NONE)] = 0.0
     drag: Annotated[float, Quantity("Ns^2/m^2", -1e9, 1e9, NONE)] = 0.0
     relaxation: Annotated[float, Quantity("s", 0.0, 10.0, NONE)] = 0.0
     cogging: Annotated[float, Quantity("N", 0.0, 1e7, NONE)] = 0.0

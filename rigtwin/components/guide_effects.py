@@ -212,6 +212,18 @@ KINDS = (
         },
     ),
     Kind(
+        "cubic_stiffness",
+        "cubic stiffness",
+        ("cubic_stiffness",),
+        "a spring that hardens, or softens, with the cube of its deflection",
+        {
+            Guide: around_nominal(
+                lambda s: s.force / s.stroke**3, (-3.0, -0.5, -0.05, 0.05, 0.5, 3.0), 0.01
+            )
+        },
+        needs="stiffness",
+    ),
+    Kind(
         "slack",
         "slack",
         ("slack",),

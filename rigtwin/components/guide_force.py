@@ -85,10 +85,13 @@ def quick_damping(guide: Guide, position: float, velocity: float) -> float:
 def position_force(guide: Guide, position: float, rest: float) -> float:
     """Return spring, constant force, cogging, curve and end stops at a position, N.
 
-    F = stiffness·t(x − rest) + offset + cogging·sin(2π·x/cogging_pitch + cogging_phase) + curve
-    + stop_stiffness·s(x), with the way s(x) beyond an end stop, and the way t(d) beyond the slack.
+    F = stiffness·t(x − rest) + cubic_stiffness·t(x − rest)³ + offset
+    + cogging·sin(2π·x/cogging_pitch + cogging_phase) + curve + stop_stiffness·s(x), with the way
+    s(x) beyond an end stop, and the way t(d) beyond the slack.
     """
-    force = guide.stiffness * beyond_slack(guide, position - rest) + guide.offset
+    deflection = beyond_slack(guide, position - rest)
+    stiffness = guide.stiffness + guide.cubic_stiffness * deflection * deflection
+    force = stiffness * deflection + guide.offset
     if has_curve(guide):
         force += curve(guide, position)
     if guide.cogging != 0.0:

@@ -51,6 +51,7 @@ PRESCRIBED = [
     "viscous",
     "offset",
     "stiffness",
+    "cubic_stiffness",
     "asymmetry",
     "stribeck",
     "load_friction",

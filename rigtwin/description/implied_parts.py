@@ -21,6 +21,7 @@ FREE = [
     "drag",
     "offset",
     "stiffness",
+    "cubic_stiffness",
     "stribeck",
     "load_friction",
     "position_force",
@@ -108,7 +109,7 @@ def add_tendons(
     for tendon in _tendons_of(mechanism, joints):
         effects = ["coulomb", "viscous"]
         if mechanism.friction("tendon", tendon)["stiffness"]:
-            effects += ["stiffness", "slack"]
+            effects += ["stiffness", "cubic_stiffness", "slack"]
         tables[identifier(tendon)] = {"tendon": tendon, "effects": effects}
 
 

@@ -43,6 +43,7 @@ TURNING = {
     "m/s^2": "rad/s^2",
     "N/s": "Nm/s",
     "m/N": "rad/Nm",
+    "N/m^3": "Nm/rad^3",
     "Ns^2/m^2": "Nms^2/rad^2",
 }
 """Unit of a quantity at a slide → its unit at a hinge."""

@@ -394,19 +394,24 @@ class Mechanism:
         return float(np.mean(self.model.tendon_lengthspring[self.number("tendon", tendon)]))
 
     def friction(self, element: str, name: str) -> dict[str, float]:
-        """Return friction, damping and stiffness of a joint or tendon as parameters of a Guide."""
+        """Return friction, damping and stiffness of a joint or tendon as parameters of a Guide.
+
+        MuJoCo's polynomials hold more than a Guide: see `beyond_guide`.
+        """
         model, number = self.model, self.number(element, name)
         if element == "tendon":
             dry, damping = model.tendon_frictionloss[number], model.tendon_damping[number]
             stiffness, weight = model.tendon_stiffness[number], model.tendon_invweight0[number]
             slack = float(np.ptp(model.tendon_lengthspring[number]))
             reference, impedance = model.tendon_solref_fri[number], model.tendon_solimp_fri[number]
+            springs, dampers = model.tendon_stiffnesspoly[number], model.tendon_dampingpoly[number]
         else:
             at = int(model.jnt_dofadr[number])
             dry, damping = model.dof_frictionloss[at], model.dof_damping[at]
             stiffness, weight = model.jnt_stiffness[number], model.dof_invweight0[at]
             slack = 0.0
             reference, impedance = model.dof_solref[at], model.dof_solimp[at]
+            springs, dampers = model.jnt_stiffnesspoly[number], model.dof_dampingpoly[at]
         # The constraint asks for the acceleration −v / T within ± the friction. Its reference is a
         # time constant and a damping ratio, or, where negative, a stiffness and a damping.
         low, high = float(impedance[0]), float(impedance[1])
@@ -416,10 +421,24 @@ class Mechanism:
             "coulomb": float(dry),
             "viscous": float(np.ravel(damping)[0]),
             "stiffness": float(np.ravel(stiffness)[0]),
+            # F = −k·d − k₁·d² − k₂·d³ and F = −c·v − c₁·v·|v| − c₂·v³.
+            "cubic_stiffness": float(springs[1]),
+            "drag": float(dampers[0]),
             "slack": slack,
             "soft_time": soft_time,
             "soft_speed": soft_time * (1.0 - low) / low * float(weight),
         }
+
+    def beyond_guide(self, element: str, name: str) -> tuple[str, ...]:
+        """Return the parts of a joint's or tendon's polynomials that a Guide cannot express."""
+        model, number = self.model, self.number(element, name)
+        if element == "tendon":
+            springs, dampers = model.tendon_stiffnesspoly[number], model.tendon_dampingpoly[number]
+        else:
+            springs = model.jnt_stiffnesspoly[number]
+            dampers = model.dof_dampingpoly[model.jnt_dofadr[number]]
+        parts = {"quadratic part of its stiffness": springs[0], "cubic damping": dampers[1]}
+        return tuple(part for part, value in parts.items() if value != 0.0)
 
     def body(self, name: str) -> dict[str, float]:
         """What the MJCF says of a body alone: mass, kg, its centre in the body's frame, m, and how

@@ -21,12 +21,17 @@ from rigtwin.errors import RigtwinError
 from rigtwin.files import atomic_write
 
 ATTRIBUTES: dict[type, dict[str, str]] = {
-    Guide: {"coulomb": "frictionloss", "viscous": "damping", "stiffness": "stiffness"},
+    Guide: {"coulomb": "frictionloss"},
     Rail: {"coulomb": "frictionloss", "viscous": "damping"},
     Rotor: {"inertia": "armature"},
     Servo: {"position_gain": "kp", "damping_gain": "kv"},
 }
 """Type of component → parameter → attribute of its joint, tendon or position actuator."""
+POLYNOMIALS = {
+    "stiffness": ("stiffness", "", "cubic_stiffness"),
+    "damping": ("viscous", "drag"),
+}
+"""Attribute of a joint or tendon → parameters of a guide that are its coefficients; "" is zero."""
 STOP = ("stop_stiffness", "stop_damping", "stop_low", "stop_high")
 """Parameters of a guide's end stops, which are written together."""
 SOFTEST = 1e-4
@@ -93,6 +98,16 @@ def _apply(document: Document, machine: Machine, change: Change, changes: Sequen
     component = machine.components.get(change.component)
     if component is None:
         return False
+    if component.component_type is Guide and component.element in ("joint", "tendon"):
+        for attribute, coefficients in POLYNOMIALS.items():
+            if change.parameter in coefficients:
+                tag = document.find(component.element, component.mjcf)
+                values = _values(machine, component, changes)
+                numbers = [values.get(name, 0.0) for name in coefficients]
+                while len(numbers) > 1 and numbers[-1] == 0.0:
+                    numbers.pop()
+                document.set(tag, attribute, " ".join(map(_number, numbers)))
+                return True
     attribute = ATTRIBUTES.get(component.component_type, {}).get(change.parameter)
     if attribute is not None and component.element in PARENTS:
         tag = document.find(component.element, component.mjcf)
@@ -130,9 +145,7 @@ def _set_stops(
     approximation D [MuJoCo documentation, Computation, Constraint model]. For d → 0 it is a spring
     of the stiffness k/D with a damper of c/D.
     """
-    guide = component_of(machine.plant, component.name, Guide)
-    values = {name: float(getattr(guide, name)) for name in STOP}
-    values |= {c.parameter: c.value for c in changes if c.component == component.name}
+    values = _values(machine, component, changes)
     mechanism = Mechanism(machine.model)
     model, number = mechanism.model, mechanism.number("joint", component.mjcf)
     light = float(model.dof_invweight0[model.jnt_dofadr[number]])
@@ -147,6 +160,14 @@ def _set_stops(
     document.set(tag, "range", " ".join(map(_number, ends)))
     document.set(tag, "solreflimit", " ".join(map(_number, reference)))
     document.set(tag, "solimplimit", f"{SOFTEST:g} {SOFTEST:g} 0.001")
+
+
+def _values(machine: Machine, component: Component, changes: Sequence[Change]) -> dict[str, float]:
+    """Return the parameters of a guide with the changes that concern it."""
+    values = {
+        k: float(v) for k, v in component_of(machine.plant, component.name, Guide)._asdict().items()
+    }
+    return values | {c.parameter: c.value for c in changes if c.component == component.name}
 
 
 def _factor_of(component: Component, changes: Sequence[Change]) -> float:

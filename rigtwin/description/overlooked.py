@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import mujoco
 import numpy as np
 
+from rigtwin.components import Guide
 from rigtwin.components.sensors import MEASURES
 from rigtwin.description.component import Component
 from rigtwin.description.mechanism import Mechanism, Tie
@@ -41,6 +42,7 @@ def overlooked(
     return (
         *_joints(model, components, replays, {tie.joint for tie in ties}),
         *_dissipation(model, components),
+        *_polynomials(mechanism, components),
         *_constraints(model, {tie.number for tie in ties}),
         *_actuators(model, components),
     )
@@ -113,6 +115,14 @@ def _dissipation(model: mujoco.MjModel, components: Mapping[str, Component]) -> 
         name = _name(model, mujoco.mjtObj.mjOBJ_TENDON, number)
         if ("tendon", name) not in described:
             yield f"tendon {name}: no component describes it"
+
+
+def _polynomials(mechanism: Mechanism, components: Mapping[str, Component]) -> Iterator[str]:
+    """Yield what springs and dampers of the model have beyond a guide's law."""
+    for part in components.values():
+        if part.component_type is Guide and part.element in ("joint", "tendon"):
+            for feature in mechanism.beyond_guide(part.element, part.mjcf):
+                yield f"{part.element} {part.mjcf}: the {feature}"
 
 
 def _constraints(model: mujoco.MjModel, followed: set[int]) -> Iterator[str]:

@@ -50,6 +50,7 @@ PICTURES: dict[str, str] = {
     "backlash": "loop",
     "stiffness": "loop",
     "slack": "loop",
+    "cubic_stiffness": "loop",
     "hardening": "loop",
     "compliance": "loop",
     "mount": "loop",

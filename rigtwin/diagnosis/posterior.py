@@ -30,6 +30,7 @@ from rigtwin.components import Effect
 from rigtwin.components.plant import Plant
 from rigtwin.description.prior import ModelPrior
 from rigtwin.diagnosis.deviance import Weighted, deviance
+from rigtwin.diagnosis.fit import Fit
 from rigtwin.diagnosis.fitter import Fitter
 from rigtwin.diagnosis.prices import Prices
 from rigtwin.diagnosis.scoring import Scored
@@ -195,7 +196,9 @@ class HypothesisPosterior:
         It is taken about the values of the best hypothesis. It adds the uncertainty of the
         hypothesis to that of the fit. A hypothesis is comparable if it contains those effects of
         the best one that have rivals: with a rival in their place, all other values may differ,
-        and the finding says which they are (`Rival.beside`).
+        and the finding says which they are (`Rival.beside`). It is not comparable either if another
+        effect of the same component stands in the place of one of the best one: the stiffness
+        beside a curve over the stroke is another quantity than that beside a cubic spring.
 
         Parameters
         ----------
@@ -213,13 +216,19 @@ class HypothesisPosterior:
         contested = {member for member in self.best.fit.effects if self.rivals(member)}
         for hypothesis in self.ranking:
             fit = hypothesis.scored.fit
-            if {effect, *contested} <= {*fit.effects}:
+            if {effect, *contested} <= {*fit.effects} and not self._replaces(fit, effect.component):
                 values = fit.values[fit.effects.index(effect)]
                 # Squares about the best values and not about their mean, so that the bias of the
                 # best hypothesis is contained.
                 variance += hypothesis.weight * (np.array(values) - chosen) ** 2
                 weight += hypothesis.weight
         return tuple(np.sqrt(variance / weight).tolist())
+
+    def _replaces(self, fit: Fit, component: str) -> bool:
+        """Return whether a fit has another effect in the place of one at a component."""
+        here = {effect for effect in fit.effects if effect.component == component}
+        best = {effect for effect in self.best.fit.effects if effect.component == component}
+        return bool(best - here) and bool(here - best)
 
     def rivals(self, effect: Effect) -> tuple[Effect, ...]:
         """Return the effects that the data cannot tell from one of the best hypothesis.

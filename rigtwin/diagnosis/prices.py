@@ -30,6 +30,7 @@ RARE = (
     "mount",
     "cogging",
     "position_force",
+    "cubic_stiffness",
     "end_stops",
     "relaxation",
     "drag",

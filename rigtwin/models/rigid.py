@@ -106,10 +106,12 @@ def strip(model: mujoco.MjModel, guides: Sequence[Component], rotors: Sequence[C
         if component.element == "tendon":
             number = model.tendon(component.mjcf).id
             model.tendon_damping[number] = model.tendon_stiffness[number] = 0.0
+            model.tendon_dampingpoly[number] = model.tendon_stiffnesspoly[number] = 0.0
         else:
             number = model.joint(component.mjcf).id
             model.dof_damping[model.jnt_dofadr[number]] = 0.0
-            model.jnt_stiffness[number] = 0.0
+            model.dof_dampingpoly[model.jnt_dofadr[number]] = 0.0
+            model.jnt_stiffness[number] = model.jnt_stiffnesspoly[number] = 0.0
     for component in rotors:
         if component.element == "tendon":
             model.tendon_armature[model.tendon(component.mjcf).id] = 0.0

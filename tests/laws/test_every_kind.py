@@ -24,8 +24,10 @@ def test_every_written_law_belongs_to_a_kind_of_effect():
 
 
 def test_a_new_kind_of_effect_without_a_law_is_noticed():
-    cubic = Kind("cubic_stiffness", "cubic stiffness", ("cubic",), "a spring", {Guide: None})
-    assert laws_of([cubic]) - collect_laws() == {("cubic_stiffness", "Guide")}
+    quintic = Kind(
+        "quintic_stiffness", "quintic stiffness", ("quintic",), "a spring", {Guide: None}
+    )
+    assert laws_of([quintic]) - collect_laws() == {("quintic_stiffness", "Guide")}
 
 
 def test_an_old_kind_at_a_new_component_type_is_noticed():

@@ -204,6 +204,15 @@ def test_a_spring_bears_no_force_within_its_slack(deflection, pull):
     assert position_force(guide, 0.004 + deflection, 0.004) == pytest.approx(pull, abs=1e-9)
 
 
+@law_of("cubic_stiffness", Guide)
+@pytest.mark.parametrize("deflection", [-0.2, 0.0, 0.05, 0.3])
+def test_a_spring_hardens_with_the_cube_of_its_deflection(deflection):
+    """F = k d + k₃ d³."""
+    guide = Guide(stiffness=200.0, cubic_stiffness=900.0)
+    expected = 200.0 * deflection + 900.0 * deflection**3
+    assert position_force(guide, 0.1 + deflection, 0.1) == pytest.approx(expected, abs=1e-9)
+
+
 def test_the_nominal_wave_has_a_pitch_of_30_mm_and_no_phase():
     guide = Guide(cogging=3.0)
     assert position_force(guide, 0.0075, 0.0) == pytest.approx(3.0)
