@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rigtwin.components import candidates
 from rigtwin.diagnosis.blocks import count_independent, find_bands, split_transforms
 from rigtwin.diagnosis.deviance import deviance
 from rigtwin.diagnosis.explain import explain
@@ -134,3 +135,22 @@ def test_confidence_grows_with_the_probability_and_is_never_certain():
 def test_confidence_falls_with_the_chance_of_a_mimic():
     said = [support(mimic=float(m)).confidence for m in np.linspace(0.0, 1.0, 50)]
     assert said == sorted(said, reverse=True)
+
+
+@pytest.mark.parametrize(
+    ("delay", "lag", "is_doubtful"),
+    [(-0.014, 0.015, True), (0.014, -0.015, True), (0.014, 0.015, False), (-0.014, -0.015, False)],
+)
+def test_a_sensor_that_is_ahead_and_lags_at_once_is_prohibitive(damped, delay, lag, is_doubtful):
+    best, prices = damped.posterior.best, damped.posterior.prices
+    effects = {effect.name: effect for effect in candidates(damped.fit.plant)}
+    pair = (effects["delay@load_cell"], effects["lag@load_cell"])
+    fit = replace(best.fit, effects=pair, values=((delay,), (lag,)))
+    # Neither opposes the other, and both account for the whole signal.
+    scored = replace(
+        best, fit=fit, together=np.ones((2, 2)), accounts=np.ones(2), widths=((1e-4,), (1e-4,))
+    )
+    doubt = prices.price_values(scored) - prices.price_values(
+        replace(scored, fit=replace(fit, values=((0.014,), (0.015,))))
+    )
+    assert doubt == pytest.approx(STANDARD.prohibitive_price if is_doubtful else 0.0)

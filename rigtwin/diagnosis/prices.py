@@ -44,6 +44,8 @@ ELUSIVE = ("payload",)
 the zero or the friction of several joints."""
 CONTAINS_SIMPLER = ("two_lags", "mount", "deadband_asymmetry")
 """Kinds that become a simpler kind at an end of their range."""
+LATE = ("delay", "lag")
+"""Kinds that make a signal late, or early where negative."""
 SETTINGS = ("damping_gain",)
 """Kinds that change a number which somebody set, and resemble friction."""
 WEIGHED = ("mass",)
@@ -143,9 +145,19 @@ class Prices:
         """Return the price of pairs of effects that cancel each other.
 
         Only pairs of effects that the nominal machine lacks count: a correction of a nominal value
-        may rightly oppose another effect.
+        may rightly oppose another effect. A signal that is ahead of time and lags, both at once, is
+        such a pair at any size: no sensor does that, and together they resemble an inertia or an
+        elastic part that is not modelled.
         """
         t, price = self._thresholds, 0.0
+        late = {
+            (effect.component, effect.kind.name): values[0]
+            for effect, values in zip(scored.fit.effects, scored.fit.values, strict=True)
+            if effect.kind.name in LATE
+        }
+        for component in {component for component, _ in late}:
+            delay, lag = (late.get((component, kind), 0.0) for kind in LATE)
+            price += t.prohibitive_price * (delay * lag < 0.0)
         absent = [self._nominal(effect) == 0.0 for effect in scored.fit.effects]
         for first in range(len(absent)):
             for second in range(first):
