@@ -58,6 +58,7 @@ def test_every_machine_of_joints_has_a_test_within_its_ranges(tmp_path: Path):
     assert "excite" in rigtwin.experiments("tx40")
 
 
+@pytest.mark.slow
 def test_a_hidden_friction_is_found_by_the_model_alone(motors: Path, tmp_path: Path):
     path = tmp_path / "log.mcap"
     rigtwin.run(motors, "excite", effects={"coulomb@elbow": 0.4}, settings=SHORT, path=path)

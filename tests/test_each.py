@@ -38,6 +38,7 @@ def files(folder: Path) -> list[Path]:
     return [folder / f"{name}.mcap" for name in ("plain", "none", "rubs")]
 
 
+@pytest.mark.slow
 def test_each_answer_is_that_of_a_diagnosis_alone(folder: Path, tmp_path: Path) -> None:
     shown: list[tuple[int, int]] = []
     answers = rigtwin.diagnose_each(

@@ -107,7 +107,7 @@ def test_the_spring_between_two_joints_may_be_another(tmp_path: Path) -> None:
     described = rigtwin.describe(tmp_path / "shaft.xml", write_log(tmp_path / "log.csv", columns))
     assert described.reading.kind.test == "force commands"
     names = {effect.kind.name for effect in described.machine.effects() if effect.group == "shaft"}
-    assert names == {"coulomb", "viscous", "stiffness", "slack"}
+    assert names == {"coulomb", "viscous", "stiffness", "cubic_stiffness", "slack"}
 
 
 FLOOR = """[machine]

@@ -87,6 +87,7 @@ def test_same_seed_same_settings(recording, calibration):
     assert np.array_equal(again.envelope, calibration.envelope)
 
 
+@pytest.mark.slow
 def test_refuses_what_it_cannot_use(recording, example):
     settings = find("friction-road").configuration.controller
     with pytest.raises(RigtwinError, match="compensator 'observer'; expected 'none'"):
