@@ -34,6 +34,7 @@ def recorded(
             machine,
             "shake",
             seed=first + n,
+            settings={"timing": {"duration": 2.0}},
             effects={"coulomb@guide": friction},
             path=None if folder is None else folder / f"{n}.mcap",
         )

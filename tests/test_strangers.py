@@ -20,7 +20,7 @@ SPEC = find_spec("dm_control")
 assert SPEC is not None
 assert SPEC.origin is not None
 SUITE = Path(SPEC.origin).parent / "suite"
-PERIOD, DURATION, FINE = 4e-3, 6.0, 8
+PERIOD, DURATION, FINE = 4e-3, 4.0, 8
 
 
 @dataclass(frozen=True)
