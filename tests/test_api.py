@@ -347,6 +347,7 @@ def test_mistakes_of_a_check_are_said_before_it_starts(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_a_setting_that_a_comparison_does_not_use_is_refused_at_its_default_too(tmp_path):
     """It would be the recording's own, whatever is said; a file may hold all that there are."""
     own = rigtwin.machine("suspension-rig").configuration.controller.preload

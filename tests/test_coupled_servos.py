@@ -30,7 +30,7 @@ NOMINAL = {
     "kv2": 2.0,
     "f1": 40.0,
 }
-PERIOD, TICKS, NOISE = 0.01, 800, 1e-4
+PERIOD, TICKS, NOISE = 0.01, 640, 1e-4
 Alter = Callable[[mujoco.MjModel, mujoco.MjData, Array], Array]
 """Function of model, data and commands that returns what the servos see; it may apply forces."""
 

@@ -33,7 +33,7 @@ def drive(model: mujoco.MjModel) -> np.ndarray:
     return np.array(rows)
 
 
-@pytest.mark.parametrize("named", [True, False])
+@pytest.mark.parametrize("named", [True, pytest.param(False, marks=pytest.mark.slow)])
 def test_stops_are_found_where_they_are_and_only_there(tmp_path: Path, named: bool) -> None:
     (tmp_path / "stopped.xml").write_text(MODEL.format(limits=""))
     limits = ' limited="true" range="-0.05 0.05"' if named else ""

@@ -401,6 +401,7 @@ class TestCommand:
         assert written["models"]["suspension"]["critical_lag"] == pytest.approx(94_300 / 1_950_000)
         assert written["models"]["rig"]["stable"] is False
 
+    @pytest.mark.slow
     def test_settings_delay_and_map(self, capsys, tmp_path):
         out = tmp_path / "map.png"
         words = ("--set", "suspension_damping=100", "--tau", "0.02")

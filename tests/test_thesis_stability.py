@@ -42,6 +42,7 @@ def disagreeing(entries):
     return [(entry.where, entry.what, entry.ours) for entry in entries if not entry.agrees]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("table", "expected"),
     [

@@ -23,7 +23,7 @@ from rigtwin.watching.watch import LIMIT, WINDOW
 LATER = 6.0
 """s, from when on an effect is there."""
 EFFECT = ("coulomb@rail", 60.0)
-LENGTH = {"timing": {"duration": 11.0}}
+LENGTH = {"timing": {"duration": 9.0}}
 
 
 @pytest.fixture(scope="module")
@@ -52,7 +52,7 @@ def test_a_nominal_test_gives_no_alarm(nominal):
     watch = rigtwin.watch(nominal)
     assert watch.alarm is None
     assert watch.highest < 0.5
-    assert watch.judged == pytest.approx(11.0, abs=0.01)
+    assert watch.judged == pytest.approx(9.0, abs=0.01)
     assert watch.seconds == pytest.approx(watch.judged, abs=0.5)
     for signal, ratio in watch.ratios.items():
         assert 0.7 < ratio < 1.3, signal
@@ -221,7 +221,7 @@ def test_a_damaged_stretch_does_not_end_the_watch(nominal, tmp_path):
     path.write_bytes(data)
     watch = rigtwin.watch(path, suspects=False)
     assert watch.alarm is None
-    assert watch.judged == pytest.approx(11.0, abs=0.01)
+    assert watch.judged == pytest.approx(9.0, abs=0.01)
 
 
 def test_it_can_be_stopped(nominal):

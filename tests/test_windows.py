@@ -45,9 +45,10 @@ def measured(start: tuple[float, float], ticks: int) -> tuple[np.ndarray, np.nda
     return torques, integrate(torques, start, (0.0, 0.0))[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("start", "regular"),
-    [((0.2, -0.1), True), pytest.param((3.0, 0.5), False, marks=pytest.mark.slow)],
+    [((0.2, -0.1), True), ((3.0, 0.5), False)],
 )
 def test_a_whirling_double_pendulum_is_predicted_to_the_noise(
     tmp_path: Path, start: tuple[float, float], regular: bool
