@@ -41,8 +41,8 @@ def count_unit(columns: Columns, column: str, turns: bool, key: str) -> Unit | N
     written = split_words(columns.units.get(column, ""))
     if not COUNTS & {*written, *split_words(column)}:
         return None
-    found = {int(a or b) for line in columns.remarks for a, b in _PER_TURN.findall(line)}
-    if turns and len(found) == 1 and (count := found.pop()):
+    per_turn = {int(a or b) for line in columns.remarks for a, b in _PER_TURN.findall(line)}
+    if turns and len(per_turn) == 1 and (count := per_turn.pop()):
         return Unit("rev", f"{count} counts a turn, as the log says above its data", 1.0 / count)
     what = "how many of them make a turn" if turns else "how many metres is one of them"
     factor = f"6.2832 / NUMBER * {column}" if turns else f"METRES * {column}"

@@ -98,16 +98,8 @@ def _apply(document: Document, machine: Machine, change: Change, changes: Sequen
     component = machine.components.get(change.component)
     if component is None:
         return False
-    if component.component_type is Guide and component.element in ("joint", "tendon"):
-        for attribute, coefficients in POLYNOMIALS.items():
-            if change.parameter in coefficients:
-                tag = document.find(component.element, component.mjcf)
-                values = _values(machine, component, changes)
-                numbers = [values.get(name, 0.0) for name in coefficients]
-                while len(numbers) > 1 and numbers[-1] == 0.0:
-                    numbers.pop()
-                document.set(tag, attribute, " ".join(map(_number, numbers)))
-                return True
+    if component.component_type is Guide and _set_polynomial(document, machine, change, changes):
+        return True
     attribute = ATTRIBUTES.get(component.component_type, {}).get(change.parameter)
     if attribute is not None and component.element in PARENTS:
         tag = document.find(component.element, component.mjcf)
@@ -132,6 +124,23 @@ def _apply(document: Document, machine: Machine, change: Change, changes: Sequen
         return nominal > 0.0 and _scale_mass(document, component, change.value / nominal)
     if component.element == "actuator":
         return _apply_to_actuator(document, machine, component, change, changes)
+    return False
+
+
+def _set_polynomial(
+    document: Document, machine: Machine, change: Change, changes: Sequence[Change]
+) -> bool:
+    """Set the spring or damper of a guide. Return whether the change is one of its coefficients."""
+    component = machine.components[change.component]
+    for attribute, coefficients in POLYNOMIALS.items():
+        if change.parameter in coefficients and component.element in ("joint", "tendon"):
+            values = _values(machine, component, changes)
+            numbers = [values.get(name, 0.0) for name in coefficients]
+            while len(numbers) > 1 and numbers[-1] == 0.0:
+                numbers.pop()
+            tag = document.find(component.element, component.mjcf)
+            document.set(tag, attribute, " ".join(map(_number, numbers)))
+            return True
     return False
 
 
