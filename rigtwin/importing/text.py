@@ -132,21 +132,27 @@ def read_text(path: Path, selection: Selection = EVERYTHING) -> Columns:
             *notes,
             "the last line has no end; if the file was cut off there, its last number may be wrong",
         )
-    mark = {"\t": "tab", " ": "space"}.get(layout.separator, layout.separator)
-    form = f"text, separated by {mark}, decimal {layout.decimal}, data from line {layout.first + 1}"
     if layout.words:
-        form += f"; words in {', '.join(layout.names[place] for place in sorted(layout.words))}"
         refused |= _refuse_words(layout, head[layout.first])
     return Columns(
         values,
         units,
-        form,
+        _describe_form(layout),
         notes,
         wrong,
         listed=tuple(known),
         refused=refused,
         remarks=layout.remarks,
     )
+
+
+def _describe_form(layout: Layout) -> str:
+    """Return a description of a file's layout, for messages."""
+    mark = {"\t": "tab", " ": "space"}.get(layout.separator, layout.separator)
+    form = f"text, separated by {mark}, decimal {layout.decimal}, data from line {layout.first + 1}"
+    if not layout.words:
+        return form
+    return f"{form}; words in {', '.join(layout.names[place] for place in sorted(layout.words))}"
 
 
 def _refuse_words(layout: Layout, line: str) -> dict[str, str]:
