@@ -54,7 +54,7 @@ check: setup
 	@$(MAKE) --no-print-directory --jobs 2 --output-sync check-types check-style check-names
 
 check-types: setup
-	nice $(BIN)/pyright
+	$(BIN)/pyright
 
 check-style: setup
 	$(BIN)/ruff check .

@@ -99,16 +99,7 @@ def read_text(path: Path, selection: Selection = EVERYTHING) -> Columns:
         Saying what is wrong, and in which line.
     """
     encoding = find_encoding(path)
-    head = list(islice(read_lines(path, encoding), HEADER))
-    # Blank lines at the end would count as lines of another shape in a short file.
-    while head and not head[-1].strip():
-        head.pop()
-    try:
-        layout = find_layout(head)
-    except RigtwinError as error:
-        raise RigtwinError(f"{path}: {error}") from None
-    if layout is None:
-        raise RigtwinError(f"{path}: no lines of numbers in its first {HEADER} lines")
+    head, layout = _read_head(path, encoding)
     refused = repeated_names(layout.names)
     known = {
         name: place
@@ -144,6 +135,21 @@ def read_text(path: Path, selection: Selection = EVERYTHING) -> Columns:
         refused=refused,
         remarks=layout.remarks,
     )
+
+
+def _read_head(path: Path, encoding: str) -> tuple[list[str], Layout]:
+    """Return the first lines of a file, and its layout."""
+    head = list(islice(read_lines(path, encoding), HEADER))
+    # Blank lines at the end would count as lines of another shape in a short file.
+    while head and not head[-1].strip():
+        head.pop()
+    try:
+        layout = find_layout(head)
+    except RigtwinError as error:
+        raise RigtwinError(f"{path}: {error}") from None
+    if layout is None:
+        raise RigtwinError(f"{path}: no lines of numbers in its first {HEADER} lines")
+    return head, layout
 
 
 def _describe_form(layout: Layout) -> str:
