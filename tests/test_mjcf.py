@@ -69,6 +69,9 @@ def test_what_a_guide_cannot_express_of_a_polynomial_is_said(tmp_path):
         "joint axis: the quadratic part of its stiffness",
         "joint axis: the cubic damping",
     )
+    machine = rigtwin.machine(tmp_path / "bench.toml")
+    change = Change("guide", "stiffness", 200.0)
+    assert write_mjcf(tmp_path / "new.xml", machine, [change]) == ("guide.stiffness = 200",)
 
 
 def test_only_what_is_corrected_changes(machine, tmp_path):

@@ -139,7 +139,13 @@ def test_confidence_falls_with_the_chance_of_a_mimic():
 
 @pytest.mark.parametrize(
     ("delay", "lag", "is_doubtful"),
-    [(-0.014, 0.015, True), (0.014, -0.015, True), (0.014, 0.015, False), (-0.014, -0.015, False)],
+    [
+        (-0.014, 0.015, True),
+        (0.014, -0.015, True),
+        (0.014, 0.015, False),
+        (-0.014, -0.015, False),
+        (-1e-12, 0.015, False),
+    ],
 )
 def test_a_sensor_that_is_ahead_and_lags_at_once_is_prohibitive(damped, delay, lag, is_doubtful):
     best, prices = damped.posterior.best, damped.posterior.prices
@@ -151,6 +157,6 @@ def test_a_sensor_that_is_ahead_and_lags_at_once_is_prohibitive(damped, delay, l
         best, fit=fit, together=np.ones((2, 2)), accounts=np.ones(2), widths=((1e-4,), (1e-4,))
     )
     doubt = prices.price_values(scored) - prices.price_values(
-        replace(scored, fit=replace(fit, values=((0.014,), (0.015,))))
+        replace(scored, fit=replace(fit, values=((abs(delay),), (abs(lag),))))
     )
-    assert doubt == pytest.approx(STANDARD.prohibitive_price if is_doubtful else 0.0)
+    assert doubt == pytest.approx(STANDARD.prohibitive_price if is_doubtful else 0.0, abs=1e-6)

@@ -45,5 +45,5 @@ def count_unit(columns: Columns, column: str, turns: bool, key: str) -> Unit | N
     if turns and len(per_turn) == 1 and (count := per_turn.pop()):
         return Unit("rev", f"{count} counts a turn, as the log says above its data", 1.0 / count)
     what = "how many of them make a turn" if turns else "how many metres is one of them"
-    factor = f"6.2832 / NUMBER * {column}" if turns else f"METRES * {column}"
+    factor = f"6.283185 / NUMBER * {column}" if turns else f"METRES * {column}"
     raise ask(f"column {column!r} is in counts; {what}?", option(key, factor))

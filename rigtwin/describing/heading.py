@@ -51,7 +51,7 @@ UNITS_WITH_CAPITALS = {
 }
 """Unit whose capitals count → word by which it is known here."""
 _CAPITALS = re.compile(r"(?<=[_\s(\[])(mNm|kNm|Ncm|mN|kN|mA|N)(?=[)\]]?(?:[_\s]\d+)?$)")
-"""Such a unit at the end of a name, before the number of a joint at most."""
+"""Unit with capitals at the end of a name, where only the number of a joint may follow it."""
 PRECEDENCE = (
     JointQuantity.OTHER,
     JointQuantity.VOLTAGE,
@@ -112,7 +112,7 @@ def split_words(name: str) -> tuple[str, ...]:
 
 
 def _part_prefix(word: str) -> tuple[str, ...]:
-    """Return the words of which one is made without a sign between them: iref is i and ref."""
+    """Return the two words that a name joins without a sign, such as current and ref of iref."""
     for prefix in sorted(PREFIXES, key=len, reverse=True):
         if word.startswith(prefix) and word[len(prefix) :] in SUFFIXES:
             return PREFIXES[prefix], word[len(prefix) :]

@@ -132,8 +132,13 @@ def _set_polynomial(
 ) -> bool:
     """Set the spring or damper of a guide. Return whether the change is one of its coefficients."""
     component = machine.components[change.component]
+    if component.element not in ("joint", "tendon"):
+        return False
     for attribute, coefficients in POLYNOMIALS.items():
-        if change.parameter in coefficients and component.element in ("joint", "tendon"):
+        if change.parameter in coefficients:
+            if Mechanism(machine.model).beyond_guide(component.element, component.mjcf):
+                # The coefficients that a guide does not have would be lost.
+                return False
             values = _values(machine, component, changes)
             numbers = [values.get(name, 0.0) for name in coefficients]
             while len(numbers) > 1 and numbers[-1] == 0.0:

@@ -145,9 +145,9 @@ class Prices:
         """Return the price of pairs of effects that cancel each other.
 
         Only pairs of effects that the nominal machine lacks count: a correction of a nominal value
-        may rightly oppose another effect. A signal that is ahead of time and lags, both at once, is
-        such a pair at any size: no sensor does that, and together they resemble an inertia or an
-        elastic part that is not modelled.
+        may rightly oppose another effect. A negative delay beside a lag, or the reverse, is such a
+        pair whatever its response: no sensor is early and late at once, and both together resemble
+        an inertia or an elastic part that is not modelled.
         """
         t, price = self._thresholds, 0.0
         late = {
@@ -157,7 +157,10 @@ class Prices:
         }
         for component in {component for component, _ in late}:
             delay, lag = (late.get((component, kind), 0.0) for kind in LATE)
-            price += t.prohibitive_price * (delay * lag < 0.0)
+            if delay * lag < 0.0:
+                # A value near zero must not decide by its sign.
+                smaller, larger = sorted((abs(delay), abs(lag)))
+                price += t.prohibitive_price * min(2.0 * smaller / larger, 1.0)
         absent = [self._nominal(effect) == 0.0 for effect in scored.fit.effects]
         for first in range(len(absent)):
             for second in range(first):
