@@ -36,20 +36,22 @@ ARM = """
 """
 TENDON = """
   <tendon>
-    <fixed name="cable" stiffness="7" damping="0.3">
+    <fixed name="cable" {acts}>
       <joint joint="shoulder" coef="1"/><joint joint="elbow" coef="-0.5"/>
     </fixed>
   </tendon>
 """
 
 
-@pytest.mark.parametrize("tendon", ["", TENDON])
-def test_inertia_and_bias_are_those_of_mujoco(tmp_path: Path, tendon: str) -> None:
+@pytest.mark.parametrize("acts", [None, "", 'stiffness="7"', 'damping="0 0.3"', 'armature="0.1"'])
+def test_inertia_and_bias_are_those_of_mujoco(tmp_path: Path, acts: str | None) -> None:
     path = tmp_path / "arm.xml"
-    path.write_text(ARM.format(tendon=tendon))
+    path.write_text(ARM.format(tendon="" if acts is None else TENDON.format(acts=acts)))
     bodies = Multibody(path, ["shoulder", "elbow"], [], [])
     data = bodies.data()
     compiled = bodies.bodies(data)
+    # A tendon without any force of its own is not computed at all.
+    assert compiled.tendons == bool(acts)
     model = mujoco.MjModel.from_xml_path(str(path))
     reference = mujoco.MjData(model)
     # The wrist turns by 0.1 rad − 1.5 times the elbow.

@@ -44,7 +44,7 @@ class Bodies(NamedTuple):
     targets: np.ndarray  # Row and column that it is added to, shape (contributions, 2).
     factors: Array  # Factor on the entry, shape (contributions,).
     bias_address: int  # Address of `bias`.
-    tendons: bool  # Whether MuJoCo computes tendons, for springs that no component describes.
+    tendons: bool  # Whether a tendon acts by a force that no component describes.
     added: Array  # Inertia of the rotors, shape (coordinates, coordinates).
     steady: bool  # Whether inertia and bias are the same in every state.
     inertia: Array  # Constant inertia matrix without `added`, used if `steady`.
