@@ -17,6 +17,7 @@ from rigtwin.models.following import follow_command
 from rigtwin.models.joint import JointModel
 from rigtwin.models.joint_inverse import inverse_dynamics
 from rigtwin.models.joint_motion import Inertia
+from rigtwin.models.measured_motion import is_at_rest
 from rigtwin.recording import RecordedTest
 from rigtwin.signals.motion import smooth
 from tests.helpers.described import described, recording_of
@@ -257,7 +258,25 @@ def test_a_measured_motion_is_smoothed_to_below_its_noise():
     random = np.random.default_rng(1)
     time = np.arange(8000) * PERIOD
     true = 0.02 * np.sin(2 * np.pi * time) + 0.005 * np.sin(2 * np.pi * 2.3 * time)
-    found, error = smooth(true + 1e-5 * random.standard_normal(8000), PERIOD)
+    found, error, _ = smooth(true + 1e-5 * random.standard_normal(8000), PERIOD)
     left = (found - true)[300:-300]
     assert np.std(left) < 3e-6
     assert error < 3e-6
+
+
+def test_a_joint_stands_where_its_velocity_is_within_its_error() -> None:
+    """A stop of 0.2 s within a swing of 10 mm, seen with a noise of 10 µm."""
+    time = np.arange(4000) * PERIOD
+    swing = 0.01 * np.sin(2.0 * np.pi * 1.0 * time)
+    stop = (np.abs(time - 1.25) < 0.1) | (np.abs(time - 2.25) < 0.1)
+    true = np.interp(time, time[~stop], swing[~stop])
+    noisy = true + 1e-5 * np.random.default_rng(3).standard_normal(len(true))
+    found, _, rate_error = smooth(noisy, PERIOD)
+    rate = np.gradient(found, PERIOD)
+    moving = np.abs(np.gradient(true, PERIOD)) > 0.02
+    # The error of the velocity is that of the filter's passband.
+    assert np.std((rate - np.gradient(true, PERIOD))[moving]) < 3.0 * rate_error
+    stands = is_at_rest(rate, rate_error)
+    inner = (np.abs(time - 1.25) < 0.06) | (np.abs(time - 2.25) < 0.06)
+    assert np.mean(stands[inner]) > 0.9
+    assert not stands[moving].any()

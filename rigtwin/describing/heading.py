@@ -52,6 +52,8 @@ UNITS_WITH_CAPITALS = {
 """Unit whose capitals count → word by which it is known here."""
 _CAPITALS = re.compile(r"(?<=[_\s(\[])(mNm|kNm|Ncm|mN|kN|mA|N)(?=[)\]]?(?:[_\s]\d+)?$)")
 """Unit with capitals at the end of a name, where only the number of a joint may follow it."""
+_AMPERES = re.compile(r"^[iI][_\s](?:(.*)[_\s])?A$")
+"""Current of a motor, such as I_x_A."""
 PRECEDENCE = (
     JointQuantity.OTHER,
     JointQuantity.VOLTAGE,
@@ -104,6 +106,7 @@ def split_words(name: str) -> tuple[str, ...]:
         name = name.replace(letter, f" {word} ")
     # Before words are parted at capitals, mNm is a word. A capital N at the end is a unit too:
     # shaker_N has the words shaker, newton.
+    name = _AMPERES.sub(r"current \1 amp", name)
     name = _CAPITALS.sub(lambda match: UNITS_WITH_CAPITALS[match[0]], name)
     name = re.sub(r"([a-z])([A-Z])", r"\1 \2", name)
     words: list[str] = re.findall(r"[a-z]+|\d+", name.lower())
@@ -154,6 +157,20 @@ def read_words(words: tuple[str, ...], unit: str) -> Meaning:
     known |= frozenset().union(*WORDS.values())
     unknown = tuple(word for word in words if word not in known and not word.isdigit())
     return Meaning(quantity, commanded, unknown)
+
+
+def is_position(column: str, unit: str = "") -> bool:
+    """Return whether a column's name says that it is a measured position.
+
+    Parameters
+    ----------
+    column
+        Name of the column.
+    unit
+        Unit that the file states for it; empty if it states none.
+    """
+    meaning = read_words(split_words(column), unit)
+    return meaning.quantity is JointQuantity.POSITION and not meaning.commanded
 
 
 def _without_adjective(words: tuple[str, ...]) -> set[str]:

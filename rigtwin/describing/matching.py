@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from rigtwin.describing.heading import read_words, split_words, stated_unit
+from rigtwin.describing.heading import is_position, read_words, split_words, stated_unit
 from rigtwin.describing.joint_names import QUANTITY_WORDS, Alias, list_aliases, read_abbreviations
 from rigtwin.describing.match import NUMBERED, REMAINING, UNNAMED, Match
 from rigtwin.describing.numbered_columns import (
@@ -223,19 +223,32 @@ def _remaining(
     matches: Sequence[Match],
     unused: Mapping[str, str],
 ) -> Match | None:
-    """The position of a model's only joint, by elimination; None unless one column is left."""
-    if len(joints) != 1 or any(match.quantity is JointQuantity.POSITION for match in matches):
-        return None
+    """The position of the only joint without one, by elimination; None unless one column is left.
+
+    Beside the positions of other joints, the column has to say that it is a position, and to share
+    no word with a joint: q_hip_yaw is not that of hip_pitch.
+    """
+    placed = {match.joint for match in matches if match.quantity is JointQuantity.POSITION}
+    lacking = [joint for joint in joints if joint not in placed]
+    known = {word for joint in joints for word in split_words(joint)}
+
+    def may_be_position(column: str) -> bool:
+        return is_position(column, columns.units.get(column, "")) and not (
+            known & set(split_words(column))
+        )
+
     left = [
         column
         for column, why in unused.items()
-        if why == UNNAMED and _varies(columns.values[column])
+        if why == UNNAMED
+        and _varies(columns.values[column])
+        and (not placed or may_be_position(column))
     ]
     # With a force or a command beside it, what remains can only be what they move.
     moved = any(match.quantity is not JointQuantity.OTHER for match in matches)
-    if len(left) != 1 or not moved:
+    if len(lacking) != 1 or len(left) != 1 or not moved:
         return None
-    return Match(left[0], joints[0], JointQuantity.POSITION, REMAINING, 0.5)
+    return Match(left[0], lacking[0], JointQuantity.POSITION, REMAINING, 0.5)
 
 
 def _varies(values: Array) -> bool:

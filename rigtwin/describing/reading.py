@@ -113,10 +113,10 @@ def read_log(
     if columns.rows < FEWEST:
         raise RigtwinError(f"it has {columns.rows} rows; expected at least {FEWEST}")
     log, matches = _open(mechanism, columns, stated)
-    motions = _motions(log)
-    joints = list(motions)
+    motions = _without_followers(log, _motions(log))
     values = {joint: _position(log, signal) for joint, signal in motions.items()}
     kind, movers = _choose_movers(log, test, list(motions.values()), values)
+    joints = list(motions)
     signals = [*motions.values(), *movers]
     # Only forces can be held against inverse dynamics.
     if kind.test in (INVERSE, FORCES):
@@ -162,6 +162,20 @@ def _motions(log: Log) -> dict[str, LogSignal]:
     if not motions:
         raise _all_questions(log, ())
     return motions
+
+
+def _without_followers(log: Log, motions: Mapping[str, LogSignal]) -> dict[str, LogSignal]:
+    """Leave out joints that follow another one by an equality and that nothing drives."""
+
+    def is_driven(joint: str) -> bool:
+        measured = (JointQuantity.FORCE, JointQuantity.CURRENT, JointQuantity.FORCE_COMMAND)
+        return actuator_on(log.mechanism, joint) is not None or any(
+            log.slots.has(joint, quantity) for quantity in measured
+        )
+
+    leaders = [joint for joint in motions if is_driven(joint)]
+    followers = {tie.joint for tie in log.mechanism.ties_of(leaders)[0]}
+    return {joint: signal for joint, signal in motions.items() if joint not in followers}
 
 
 def _position(log: Log, signal: LogSignal) -> Array:

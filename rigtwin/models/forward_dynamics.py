@@ -230,7 +230,7 @@ class ForwardDynamicsModel(CoupledJoints, Model[Plant]):
                 level = white_noise(self._column(name))
                 signal = self._read[name][0]
                 noise = level * random.standard_normal(self._ticks)
-                shifts[name] = smooth(signal + noise, self._period)[0] - signal
+                shifts[name] = smooth(signal + noise, self._period).motion - signal
         if not shifts:
             return None
         return self._true(self.move(plant, shifts=shifts)) - self.predict_true(plant)

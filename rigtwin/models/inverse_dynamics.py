@@ -33,18 +33,22 @@ from rigtwin.models.basis import Passage, forms
 from rigtwin.models.joint import SEED, SMALL
 from rigtwin.models.joint_inverse import resist, resist_at_once
 from rigtwin.models.joint_simulation import KEPT
-from rigtwin.models.measured_motion import ELASTIC, ENDS, recover_motion, softest_contact
+from rigtwin.models.measured_motion import (
+    ELASTIC,
+    ENDS,
+    is_at_rest,
+    recover_motion,
+    softest_contact,
+)
 from rigtwin.models.model import Form, Model
 from rigtwin.models.rigid import RigidBodies
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.memo import Memo
 from rigtwin.recording import Inputs
 from rigtwin.signals.band import limit_band
-from rigtwin.signals.motion import smooth
+from rigtwin.signals.motion import SmoothedMotion, smooth
 from rigtwin.signals.noise import white_noise
 
-STANDING, RESTING = 0.02, 0.1
-"""Share of its rms speed below which a joint stands still, and shortest rest, s."""
 REGRESSORS = 40
 """Number of remembered regressors. A search returns to few motions."""
 ROW_EFFORT = 2e-7
@@ -116,7 +120,7 @@ class InverseDynamicsModel(Model[Plant]):
             if component.channel is not None
         }
         """Name of each schedule → values of its channel, shape (ticks,)."""
-        self._read: Mapping[str, tuple[Array, float]] = (
+        self._read: Mapping[str, SmoothedMotion] = (
             like._read
             if like is not None
             else {name: smooth(self._measured(name), self._period) for name in self._movers}
@@ -158,7 +162,7 @@ class InverseDynamicsModel(Model[Plant]):
         """
         positions = []
         for name in self._movers:
-            signal = self._read[name][0]
+            signal = self._read[name].motion
             if shifts is not None and name in shifts:
                 signal = signal + shifts[name]
             positions.append(recover_motion(sensor_of(plant, name), signal, self._period))
@@ -238,8 +242,13 @@ class InverseDynamicsModel(Model[Plant]):
 
     def _position_error(self, along: Array) -> float:
         """Return the standard error of the measured position along a direction, m."""
-        errors = np.array([self._read[name][1] for name in self._movers])
+        errors = np.array([self._read[name].error for name in self._movers])
         return float(np.sqrt(np.sum((along * errors) ** 2)))
+
+    def _is_at_rest(self, along: Array, speeds: Array) -> NDArray[np.bool_]:
+        """Return the ticks at which the motion along a direction may be at rest."""
+        errors = np.array([self._read[name].rate_error for name in self._movers])
+        return is_at_rest(along @ speeds, float(np.sqrt(np.sum((along * errors) ** 2))))
 
     def _force_of(self, name: str, plant: Plant) -> Array:
         """Return `_share_of` at the plant's own motion, remembered."""
@@ -316,21 +325,16 @@ class InverseDynamicsModel(Model[Plant]):
     def undetermined(self) -> NDArray[np.bool_]:
         """Return the ticks at which the measured motion does not determine the forces.
 
-        The dry friction of a joint at rest may have any value within its limits. At both ends of
-        the recording, accelerations are unknown.
+        They are those at which a joint is at rest, and both ends of the recording, where
+        accelerations are unknown.
         """
-        from scipy.ndimage import binary_opening  # Imported late: scipy is slow to load.
-
         speeds = self._moved(self._machine.plant)[0][1]
         unknown = np.zeros((len(self.rows), speeds.shape[1]), bool)
         end = round(ENDS / self._interval)
         unknown[:, :end] = unknown[:, -end:] = True
-        window = max(round(RESTING / self._interval), 3)
         for name, onto in self._onto.items():
             if self._machine.components[name].component_type is Guide:
-                speed = np.abs(self._along[name] @ speeds)
-                stands = speed < STANDING * float(np.sqrt(np.mean(speed**2)))
-                unknown |= (onto != 0.0)[:, None] & binary_opening(stands, np.ones(window))
+                unknown |= (onto != 0.0)[:, None] & self._is_at_rest(self._along[name], speeds)
         return unknown
 
     def propagated_noise(self, plant: Plant) -> Array | None:
@@ -364,11 +368,11 @@ class InverseDynamicsModel(Model[Plant]):
             for _ in range(DRAWS):
                 shifts = {}
                 for name in self._movers:
-                    signal, error = self._read[name]
+                    signal, error, _ = self._read[name]
                     if error > 0.0:
                         level = white_noise(self._measured(name))
                         noise = level * random.standard_normal(len(signal))
-                        shifts[name] = smooth(signal + noise, self._period)[0] - signal
+                        shifts[name] = smooth(signal + noise, self._period).motion - signal
                 if shifts:
                     motion = self._move(plant, shifts)
                     drawn.append((motion, self._bodies.forces(motion, self._gravity(plant))))

@@ -18,12 +18,12 @@ from rigtwin.description.machine import Machine
 from rigtwin.description.replay import ReplayOf, Row
 from rigtwin.models.basis import Passage, forms
 from rigtwin.models.joint_simulation import JointSimulation
-from rigtwin.models.measured_motion import ENDS, recover_motion
+from rigtwin.models.measured_motion import ENDS, is_at_rest, recover_motion
 from rigtwin.models.model import Form, Model
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Inputs
 from rigtwin.signals.band import limit_band
-from rigtwin.signals.motion import motion_band, smooth
+from rigtwin.signals.motion import SmoothedMotion, motion_band, smooth
 from rigtwin.signals.noise import white_noise
 
 INERTIAL = 0.1
@@ -71,7 +71,7 @@ class JointModel(Model[Plant]):
         self._period = inputs.period
         self.rows: tuple[Row, ...] = replay.rows
         self._joint = JointSimulation(machine, replay, inputs, configuration, steps, every, linear)
-        self._smoothed: dict[str, tuple[Array, float]] = {}
+        self._smoothed: dict[str, SmoothedMotion] = {}
         self._band = self._find_band()
 
     @property
@@ -221,7 +221,7 @@ class JointModel(Model[Plant]):
             return None
         if row.name not in self._smoothed:
             self._smoothed[row.name] = smooth(self._signals.column(*row.channel), self._period)
-        measured, error = self._smoothed[row.name]
+        measured, error, _ = self._smoothed[row.name]
         position = recover_motion(sensor_of(plant, row.name), measured, self._period)
         velocity = np.gradient(position, self._period)
         motion = np.stack([position, velocity, np.gradient(velocity, self._period)])
@@ -229,15 +229,17 @@ class JointModel(Model[Plant]):
         return required - self._joint.recorded_push(plant, position, velocity)
 
     def undetermined(self) -> NDArray[np.bool_] | None:
-        """Return the ticks at both ends of a measured motion, whose acceleration is unknown there.
+        """Return the ticks at which the measured motion does not determine the force.
 
+        They are those at rest, and both ends of the motion, whose acceleration is unknown there.
         None where no force follows from a smoothed motion.
         """
         joint = self._joint
         if joint.motion is None or joint.integrated or joint.error == 0.0:
             return None
-        ticks = self.move(self._configuration.plant).shape[1]
-        unknown = np.zeros((len(self.rows), ticks), bool)
+        velocity = self.move(self._configuration.plant)[1]
+        ticks = len(velocity)
+        unknown = np.tile(is_at_rest(velocity, joint.rate_error), (len(self.rows), 1))
         # A short recording keeps most of its ticks.
         end = min(round(ENDS / joint.interval), ticks // SHORTEST_END)
         unknown[:, :end] = unknown[:, unknown.shape[1] - end :] = True
@@ -253,8 +255,8 @@ class JointModel(Model[Plant]):
         if joint.motion is not None and joint.error > 0.0 and not joint.integrated:
             assert joint.mover.channel is not None
             level = white_noise(self._signals.column(*joint.mover.channel))
-            again, _ = smooth(joint.motion + level * random.standard_normal(ticks), self._period)
-            shift = (again - joint.motion)[:: self.every]
+            noisy = joint.motion + level * random.standard_normal(ticks)
+            shift = (smooth(noisy, self._period).motion - joint.motion)[:: self.every]
             noisy = self._rows(self.move(plant, shift=shift))
             return self._apply_sensors(plant, noisy) - self.predict(plant)
         if not joint.control.sensors:

@@ -28,6 +28,7 @@ from rigtwin.models.joint_motion import RIGID
 from rigtwin.models.measured_motion import ELASTIC, recover_motion
 from rigtwin.numerics.arrays import Array, interpolate, to_records
 from rigtwin.recording import Inputs
+from rigtwin.signals.motion import SmoothedMotion
 
 
 def recorded(machine: Machine, signals: Inputs, name: str) -> Array:
@@ -59,7 +60,7 @@ class JointDrives:
         machine: Machine,
         layout: JointLayout,
         signals: Inputs,
-        motions: Mapping[str, tuple[Array, float]],
+        motions: Mapping[str, SmoothedMotion],
         loosest: Array,
         steps: int,
     ) -> None:

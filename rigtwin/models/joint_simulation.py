@@ -61,9 +61,9 @@ class JointSimulation:
         Source of the command of a pushed joint.
     linear : bool
         Whether errors of the initial state are corrected to first order. They are fitted otherwise.
-    motion, error : Array or None, float
-        Smoothed reading of the sensor that prescribes the motion, shape (ticks,), and its standard
-        error. None and 0 for a joint that an actuator moves.
+    motion, error, rate_error : Array or None, float, float
+        Smoothed reading of the sensor that prescribes the motion, shape (ticks,), and the standard
+        errors of it and of its rate. None and 0 for a joint that an actuator moves.
 
     Raises
     ------
@@ -89,10 +89,11 @@ class JointSimulation:
         self.control = JointControl(machine, replay, inputs, configuration)
         self._command = np.zeros(inputs.ticks)
         self.motion: Array | None = None
-        self.error = 0.0
+        self.error = self.rate_error = 0.0
         self.integrated = self.mover.quantity == "velocity"
         if self.mover.quantity in ("position", "velocity"):
-            self.motion, self.error = smooth(inputs.column(*self.mover.channel), self._period)
+            smoothed = smooth(inputs.column(*self.mover.channel), self._period)
+            self.motion, self.error, self.rate_error = smoothed
         elif not self.control.closed:
             self._command = inputs.column(*self.mover.channel)
         self._schedules: dict[str, Array] = {

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rigtwin.components import Guide
 from rigtwin.components.dry_friction import friction, friction_size
@@ -11,9 +12,30 @@ from rigtwin.numerics.arrays import Array
 
 ENDS = 0.3
 """Time at both ends of a recording where the acceleration of a smoothed motion is uncertain, s."""
+AT_REST = 4.0
+"""Velocity in its standard errors up to which a joint may stand."""
+SLOWEST = 1e-3
+"""Share of the rms velocity up to which it may stand in any case: a motion without noise is not
+free of errors where it stops."""
 ELASTIC = 0.3
 """Shortest distance over which friction that reverses builds up, in errors of the measured motion.
 Without it, friction would jump with the noise of the velocity's sign."""
+
+
+def is_at_rest(velocity: Array, error: float) -> NDArray[np.bool_]:
+    """Return the ticks at which a joint stands, as far as its measured motion can tell.
+
+    Dry friction then has any value within its limits, and no force follows from the motion.
+
+    Parameters
+    ----------
+    velocity
+        Velocity along the joint, m/s, shape (ticks,).
+    error
+        Standard error of the velocity, m/s.
+    """
+    least = SLOWEST * float(np.sqrt(np.mean(velocity**2)))
+    return np.abs(velocity) <= max(AT_REST * error, least)
 
 
 def recover_motion(sensor: Sensor, measured: Array, period: float) -> Array:

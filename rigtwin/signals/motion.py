@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -84,10 +85,29 @@ def estimate_motion(
     return EstimatedMotion(expected + correction, correction, error)
 
 
-def smooth(signal: Array, period: float) -> tuple[Array, float]:
+class SmoothedMotion(NamedTuple):
+    """Smoothed measurement of a motion.
+
+    Attributes
+    ----------
+    motion : Array
+        Motion, shape (ticks,).
+    error : float
+        Standard deviation of its error.
+    rate_error : float
+        Standard deviation of the error of its rate of change, in unit/s.
+    """
+
+    motion: Array
+    error: float
+    rate_error: float
+
+
+def smooth(signal: Array, period: float) -> SmoothedMotion:
     """Smooth a measured motion: parts that cannot be told from white noise are removed.
 
     Where the motion stays within the remaining error, it is taken as rest.
+
     Parameters
     ----------
     signal : Array
@@ -97,8 +117,8 @@ def smooth(signal: Array, period: float) -> tuple[Array, float]:
 
     Returns
     -------
-    tuple of Array and float
-        Motion, shape (ticks,), and the standard deviation of its error.
+    SmoothedMotion
+        Motion, and the standard deviations of its errors.
     """
     noise = white_noise(signal)
     count = len(signal)
@@ -116,7 +136,12 @@ def smooth(signal: Array, period: float) -> tuple[Array, float]:
         ]
     )
     error = noise * math.sqrt(float(np.mean(gain)))
-    return _straighten_rests(smoothed, error, max(3, round(REST / period))), error
+    # What the filter passes of white noise has the one-sided density 2 σ² Δt · gain; (2πf)²
+    # differentiates it.
+    passed = (2 * math.pi * frequencies) ** 2 * gain
+    rate_error = noise * math.sqrt(2 * period * float(np.sum(passed) * frequencies[1]))
+    motion = _straighten_rests(smoothed, error, max(3, round(REST / period)))
+    return SmoothedMotion(motion, error, rate_error)
 
 
 def motion_band(signal: Array, period: float) -> float:
