@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from rigtwin.diagnosis.judgement import _is_lost
+from tests.engine.linear import lines_of
 
 
 @pytest.mark.parametrize(
@@ -20,6 +21,6 @@ def test_a_residual_beyond_half_of_a_signal_is_no_noise(
 ) -> None:
     """A residual counts from half of the signal's deviation and five times its noise on."""
     wave = np.sqrt(2.0) * np.sin(np.linspace(0.0, 100.0 * np.pi, 4001))[None]
-    lines = SimpleNamespace(fade=np.ones_like(wave), measured=wave, noise=np.array([noise]))
+    lines = lines_of(wave, np.array([noise]))
     evidence: Any = SimpleNamespace(lines=[lines], differences=lambda _: [missed * wave])
     assert _is_lost(evidence, evidence) is is_lost

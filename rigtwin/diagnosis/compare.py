@@ -131,7 +131,7 @@ def signal_residuals(evidence: Evidence) -> dict[str, Residual]:
     difference = lines.measured - evidence.predict(evidence.plant)[0]
     return {
         row.name: compute_residual(
-            difference[n][lines.fade[n] > 0.5], float(lines.noise[n]), row.unit, period
+            difference[n][lines.counts[n]], float(lines.noise[n]), row.unit, period
         )
         for n, row in enumerate(evidence.machine.rows)
     }

@@ -69,11 +69,9 @@ def relative_rest(evidence: Evidence, plant: Plant) -> Array:
     """
     residual, swing = [], []
     for lines, predicted in zip(evidence.lines, evidence.predict(plant), strict=True):
-        # The state of the twin is unknown at the start of a recording, where no signal has weight
-        # yet.
-        counted = lines.fade.max(axis=0) > 0.5
-        residual.append(np.mean((lines.measured - predicted)[:, counted] ** 2, axis=1))
-        swing.append(np.var(lines.measured[:, counted], axis=1))
+        mean = lines.mean(lines.measured)[:, None]
+        residual.append(lines.mean((lines.measured - predicted) ** 2))
+        swing.append(lines.mean((lines.measured - mean) ** 2))
     noise = np.mean([lines.noise**2 for lines in evidence.lines], axis=0)
     # Powers of independent parts add, so the noise is subtracted as a power. By chance the residual
     # may have less than its mean.

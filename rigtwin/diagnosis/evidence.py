@@ -458,10 +458,7 @@ def relative_errors(evidence: Evidence, plant: Plant) -> Array:
     """
     errors = []
     for lines, predicted in zip(evidence.lines, evidence.predict(plant), strict=True):
-        # The state of the twin is unknown at the start of a recording, where no signal has weight
-        # yet.
-        counts = lines.fade.max(axis=0) > 0.5
         scale = np.maximum(np.std(lines.measured, axis=1), lines.noise)
-        relative = (lines.measured - predicted)[:, counts] / scale[:, None]
-        errors.append(float(np.sqrt(np.mean(relative**2))))
+        relative = (lines.measured - predicted) / scale[:, None]
+        errors.append(float(np.sqrt(np.mean(lines.mean(relative**2)))))
     return np.array(errors)

@@ -88,16 +88,12 @@ def look_first(
 
 def _levels(evidence: Evidence) -> dict[str, float]:
     """Gap of each sensor over all recordings, in noise floors."""
-    powers = np.zeros(len(evidence.names))
-    ticks = 0
+    powers = ticks = np.zeros(len(evidence.names))
     for recorded, residual in zip(
         evidence.lines, evidence.differences(evidence.plant), strict=True
     ):
-        # The state of the twin is unknown at the start of a recording, where no signal has weight
-        # yet.
-        counts = recorded.fade.max(axis=0) > 0.5
-        powers += np.sum((residual[:, counts] / recorded.noise[:, None]) ** 2, axis=1)
-        ticks += int(counts.sum())
-    levels = np.sqrt(powers / max(ticks, 1))
+        powers = powers + recorded.total((residual / recorded.noise[:, None]) ** 2)
+        ticks = ticks + recorded.counts.sum(axis=1)
+    levels = np.sqrt(powers / np.maximum(ticks, 1.0))
     order = np.argsort(-levels)
     return {evidence.names[number]: float(levels[number]) for number in order}

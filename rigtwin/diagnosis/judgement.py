@@ -114,8 +114,7 @@ def _is_lost(evidence: Evidence, plant: Plant) -> bool:
     anything is left to be judged.
     """
     for lines, differences in zip(evidence.lines, evidence.differences(plant), strict=True):
-        counts = lines.fade.max(axis=0) > 0.5
-        missed = np.sqrt(np.mean(differences[:, counts] ** 2, axis=1))
+        missed = np.sqrt(lines.mean(differences**2))
         least = np.maximum(LOST * np.std(lines.measured, axis=1), STANDS_OUT * lines.noise)
         if np.any(missed > least):
             return True

@@ -84,7 +84,7 @@ def remaining_rms(evidence: Evidence, plant: Plant) -> dict[str, float]:
     predicted = evidence.predict(plant)
     for number, name in enumerate(evidence.names):
         parts = [
-            (recorded.measured[number] - model[number])[recorded.fade[number] > 0.5]
+            (recorded.measured[number] - model[number])[recorded.counts[number]]
             for recorded, model in zip(evidence.lines, predicted, strict=True)
         ]
         rows[name] = rms(np.concatenate(parts))

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from rigtwin.components.plant import Plant
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.gap import Level
-from rigtwin.signals.noise import rms
 
 
 def signal_levels(evidence: Evidence, corrected: Plant) -> dict[str, Level]:
@@ -25,12 +26,11 @@ def signal_levels(evidence: Evidence, corrected: Plant) -> dict[str, Level]:
         alone has 1.
     """
     lines = evidence.lines[0]
-    counted = lines.fade.max(axis=0) > 0.5
-    levels = {}
     before, after = (
-        evidence.differences(plant)[0][:, counted] for plant in (evidence.plant, corrected)
+        np.sqrt(lines.mean(evidence.differences(plant)[0] ** 2)) / lines.noise
+        for plant in (evidence.plant, corrected)
     )
-    for row, name in enumerate(evidence.names):
-        noise = float(lines.noise[row])
-        levels[name] = Level(rms(before[row]) / noise, rms(after[row]) / noise, 1.0)
-    return levels
+    return {
+        name: Level(float(before[row]), float(after[row]), 1.0)
+        for row, name in enumerate(evidence.names)
+    }

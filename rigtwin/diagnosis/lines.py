@@ -80,6 +80,19 @@ class Lines:
     length: int
     period: float
 
+    @property
+    def counts(self) -> NDArray[np.bool_]:
+        """Whether a tick of a signal has at least half the full weight, shape (rows, ticks)."""
+        return self.fade > 0.5
+
+    def mean(self, values: Array) -> Array:
+        """Return the mean of each signal's values over the ticks that count, shape (rows,)."""
+        return self.total(values) / np.maximum(self.counts.sum(axis=1), 1)
+
+    def total(self, values: Array) -> Array:
+        """Return the sum of each signal's values over the ticks that count, shape (rows,)."""
+        return np.asarray(np.sum(values, axis=1, where=self.counts))
+
 
 def weigh_lines(
     machine: Machine, recording: RecordedTest, model: Model[Any], plant: Plant, counted: Array

@@ -54,7 +54,7 @@ class Blocks:
 
 
 def power(evidence: Evidence, plant: Plant) -> list[Array]:
-    """Return the power of the residual at every tick, averaged over the signals.
+    """Return the power of the residual at every tick, averaged over the signals that count there.
 
     Parameters
     ----------
@@ -74,7 +74,8 @@ def power(evidence: Evidence, plant: Plant) -> list[Array]:
         # answer.
         with np.errstate(over="ignore"):
             relative = (lines.measured - predicted) / lines.noise[:, None]
-            powers.append(np.mean(relative**2, axis=0))
+            total = np.sum(relative**2, axis=0, where=lines.counts)
+            powers.append(total / np.maximum(lines.counts.sum(axis=0), 1))
     return powers
 
 
@@ -91,10 +92,10 @@ def gap_level(evidence: Evidence, plant: Plant) -> float:
     Returns
     -------
     float
-        Gap over the ticks with at least half the full weight; 1 is noise alone.
+        Gap over the ticks that count; 1 is noise alone.
     """
     powers = [
-        ticks[lines.fade.max(axis=0) > 0.5]
+        ticks[lines.counts.any(axis=0)]
         for ticks, lines in zip(power(evidence, plant), evidence.lines, strict=True)
     ]
     count = sum(len(part) for part in powers)
@@ -156,12 +157,11 @@ def largest_shrinkage(
         evidence.predict(after),
         strict=True,
     ):
-        counted = lines.fade.max(axis=0) > 0.5
         # Longer recordings count by their number of ticks, in the floor as in the powers.
-        floors += np.count_nonzero(counted) * floor
+        floors += lines.counts.sum(axis=1) * floor
         for number, predicted in enumerate(predictions):
-            relative = (lines.measured - predicted)[:, counted] / lines.noise[:, None]
-            powers[number] += np.sum(relative**2, axis=1)
+            relative = (lines.measured - predicted) / lines.noise[:, None]
+            powers[number] += lines.total(relative**2)
     # On the data of the fit the corrected residual is too small; see `cross_validation`.
     powers[1] *= optimism
     return max(
@@ -187,7 +187,7 @@ def blocks(evidence: Evidence, before: Plant, after: Plant) -> Blocks:
     Returns
     -------
     Blocks
-        Mean power of each block in which all ticks have at least half the full weight.
+        Mean power of each block in which at least half of the ticks count.
     """
     nominal_means: list[float] = []
     corrected_means: list[float] = []
@@ -201,13 +201,14 @@ def blocks(evidence: Evidence, before: Plant, after: Plant) -> Blocks:
         length = max(1, round(BLOCK / lines.period))
         # A short recording still gives several blocks to draw from.
         length = min(length, max(recording.ticks // 4, 1))
-        counted = lines.fade.max(axis=0) > 0.5
+        counted = np.asarray(lines.counts.any(axis=0))
         # The incomplete block at the end is dropped: means of fewer ticks scatter more than the
         # others.
         for start in range(0, len(nominal) - length + 1, length):
-            if counted[start : start + length].all():
-                nominal_means.append(float(np.mean(nominal[start : start + length])))
-                corrected_means.append(float(np.mean(corrected[start : start + length])))
+            block, part = slice(start, start + length), counted[start : start + length]
+            if np.mean(part) >= 0.5:
+                nominal_means.append(float(np.mean(nominal[block][part])))
+                corrected_means.append(float(np.mean(corrected[block][part])))
     return Blocks(np.array(nominal_means), np.array(corrected_means), declared_floor(evidence))
 
 

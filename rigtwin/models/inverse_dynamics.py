@@ -247,8 +247,11 @@ class InverseDynamicsModel(Model[Plant]):
 
     def _is_at_rest(self, along: Array, speeds: Array) -> NDArray[np.bool_]:
         """Return the ticks at which the motion along a direction may be at rest."""
-        errors = np.array([self._read[name].rate_error for name in self._movers])
-        return is_at_rest(along @ speeds, float(np.sqrt(np.sum((along * errors) ** 2))))
+        read = [self._read[name] for name in self._movers]
+        errors = np.array([each.rate_error for each in read])
+        error = float(np.sqrt(np.sum((along * errors) ** 2)))
+        moving = [each.resolution for each, share in zip(read, along, strict=True) if share]
+        return is_at_rest(along @ speeds, error, max(moving, default=0.0), self._interval)
 
     def _force_of(self, name: str, plant: Plant) -> Array:
         """Return `_share_of` at the plant's own motion, remembered."""
@@ -368,7 +371,7 @@ class InverseDynamicsModel(Model[Plant]):
             for _ in range(DRAWS):
                 shifts = {}
                 for name in self._movers:
-                    signal, error, _ = self._read[name]
+                    signal, error, *_ = self._read[name]
                     if error > 0.0:
                         level = white_noise(self._measured(name))
                         noise = level * random.standard_normal(len(signal))

@@ -87,7 +87,7 @@ class JointModel(Model[Plant]):
     def _find_band(self) -> float:
         joint = self._joint
         rows = [row for row in self.rows if row.kind == "force"]
-        if joint.motion is None or joint.integrated or joint.error == 0.0 or not rows:
+        if joint.smoothed is None or joint.error == 0.0 or not rows:
             return math.inf
         plant = self._configuration.plant
         inertia = joint.mechanics(plant)[1].mass
@@ -123,7 +123,7 @@ class JointModel(Model[Plant]):
         if self._joint.may_be_linear:
             return self._on_grid(self._steps, self.every, True)
         every = max(int(longest / self._period), 1)
-        if self._joint.motion is None or every == 1:
+        if self._joint.smoothed is None or every == 1:
             return self
         return self._on_grid(self._steps, every)
 
@@ -221,7 +221,7 @@ class JointModel(Model[Plant]):
             return None
         if row.name not in self._smoothed:
             self._smoothed[row.name] = smooth(self._signals.column(*row.channel), self._period)
-        measured, error, _ = self._smoothed[row.name]
+        measured, error, *_ = self._smoothed[row.name]
         position = recover_motion(sensor_of(plant, row.name), measured, self._period)
         velocity = np.gradient(position, self._period)
         motion = np.stack([position, velocity, np.gradient(velocity, self._period)])
@@ -235,11 +235,13 @@ class JointModel(Model[Plant]):
         None where no force follows from a smoothed motion.
         """
         joint = self._joint
-        if joint.motion is None or joint.integrated or joint.error == 0.0:
+        if joint.smoothed is None or joint.error == 0.0:
             return None
         velocity = self.move(self._configuration.plant)[1]
         ticks = len(velocity)
-        unknown = np.tile(is_at_rest(velocity, joint.rate_error), (len(self.rows), 1))
+        smoothed = joint.smoothed
+        rests = is_at_rest(velocity, smoothed.rate_error, smoothed.resolution, joint.interval)
+        unknown = np.tile(rests, (len(self.rows), 1))
         # A short recording keeps most of its ticks.
         end = min(round(ENDS / joint.interval), ticks // SHORTEST_END)
         unknown[:, :end] = unknown[:, unknown.shape[1] - end :] = True
@@ -252,11 +254,12 @@ class JointModel(Model[Plant]):
         noise of the controller's sensors changes the command.
         """
         random, joint, ticks = np.random.default_rng(SEED), self._joint, self._signals.ticks
-        if joint.motion is not None and joint.error > 0.0 and not joint.integrated:
+        if joint.smoothed is not None and joint.error > 0.0:
             assert joint.mover.channel is not None
             level = white_noise(self._signals.column(*joint.mover.channel))
-            noisy = joint.motion + level * random.standard_normal(ticks)
-            shift = (smooth(noisy, self._period).motion - joint.motion)[:: self.every]
+            motion = joint.smoothed.motion
+            again = smooth(motion + level * random.standard_normal(ticks), self._period)
+            shift = (again.motion - motion)[:: self.every]
             noisy = self._rows(self.move(plant, shift=shift))
             return self._apply_sensors(plant, noisy) - self.predict(plant)
         if not joint.control.sensors:

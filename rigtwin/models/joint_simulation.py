@@ -32,7 +32,7 @@ from rigtwin.models.start import Start
 from rigtwin.numerics.arrays import Array, clip_diverged
 from rigtwin.numerics.memo import Memo
 from rigtwin.recording import Inputs
-from rigtwin.signals.motion import smooth
+from rigtwin.signals.motion import SmoothedMotion, smooth
 
 KEPT = 24
 """Number of motions that are remembered."""
@@ -61,9 +61,9 @@ class JointSimulation:
         Source of the command of a pushed joint.
     linear : bool
         Whether errors of the initial state are corrected to first order. They are fitted otherwise.
-    motion, error, rate_error : Array or None, float, float
-        Smoothed reading of the sensor that prescribes the motion, shape (ticks,), and the standard
-        errors of it and of its rate. None and 0 for a joint that an actuator moves.
+    smoothed : SmoothedMotion or None
+        Smoothed reading of the sensor that prescribes the motion. None for a joint that an actuator
+        moves.
 
     Raises
     ------
@@ -88,12 +88,10 @@ class JointSimulation:
         assert self.mover.channel is not None
         self.control = JointControl(machine, replay, inputs, configuration)
         self._command = np.zeros(inputs.ticks)
-        self.motion: Array | None = None
-        self.error = self.rate_error = 0.0
+        self.smoothed: SmoothedMotion | None = None
         self.integrated = self.mover.quantity == "velocity"
         if self.mover.quantity in ("position", "velocity"):
-            smoothed = smooth(inputs.column(*self.mover.channel), self._period)
-            self.motion, self.error, self.rate_error = smoothed
+            self.smoothed = smooth(inputs.column(*self.mover.channel), self._period)
         elif not self.control.closed:
             self._command = inputs.column(*self.mover.channel)
         self._schedules: dict[str, Array] = {
@@ -111,6 +109,11 @@ class JointSimulation:
     def pushed(self) -> bool:
         """Whether a force moves the joint, so that its motion follows by forward dynamics."""
         return self.mover.component_type in PUSHERS
+
+    @property
+    def error(self) -> float:
+        """Standard error of the measured position that prescribes the motion, m; else 0."""
+        return 0.0 if self.smoothed is None or self.integrated else self.smoothed.error
 
     @property
     def interval(self) -> float:
@@ -243,7 +246,7 @@ class JointSimulation:
         else:
             sensor = sensor_of(plant, self.mover.name)
             position = self._undo_sensor(sensor)[:: self.every]
-            error = 0.0 if self.integrated else self.error / max(sensor.gain, 1e-9)
+            error = self.error / max(sensor.gain, 1e-9)
         out = self._inverse_dynamics(plant, position if shift is None else position + shift, error)
         if force is not None:
             out[2] -= force
@@ -251,8 +254,8 @@ class JointSimulation:
 
     def _undo_sensor(self, sensor: Sensor) -> Array:
         """Return the position behind the measured motion, m, shape (ticks,)."""
-        assert self.motion is not None
-        return self._integrate(recover_motion(sensor, self.motion, self._period))
+        assert self.smoothed is not None
+        return self._integrate(recover_motion(sensor, self.smoothed.motion, self._period))
 
     def _integrate(self, signal: Array) -> Array:
         """Return the position of an ideal sensor's signal, m, shape (ticks,).

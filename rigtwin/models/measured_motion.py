@@ -22,10 +22,13 @@ ELASTIC = 0.3
 Without it, friction would jump with the noise of the velocity's sign."""
 
 
-def is_at_rest(velocity: Array, error: float) -> NDArray[np.bool_]:
-    """Return the ticks at which a joint stands, as far as its measured motion can tell.
+def is_at_rest(
+    velocity: Array, error: float, resolution: float, period: float
+) -> NDArray[np.bool_]:
+    """Return the ticks at which a joint may stand, as far as its measured motion can tell.
 
-    Dry friction then has any value within its limits, and no force follows from the motion.
+    Dry friction then has any value within its limits, and no force follows from the motion. Nor
+    does the force follow as long as smoothing spreads the sudden begin and end of a rest.
 
     Parameters
     ----------
@@ -33,9 +36,17 @@ def is_at_rest(velocity: Array, error: float) -> NDArray[np.bool_]:
         Velocity along the joint, m/s, shape (ticks,).
     error
         Standard error of the velocity, m/s.
+    resolution
+        Time over which smoothing spreads a sudden change, s.
+    period
+        Time from tick to tick, s.
     """
+    from scipy.ndimage import binary_dilation  # Imported late: scipy is slow to load.
+
     least = SLOWEST * float(np.sqrt(np.mean(velocity**2)))
-    return np.abs(velocity) <= max(AT_REST * error, least)
+    stands = np.abs(velocity) <= max(AT_REST * error, least)
+    reach = round(resolution / period)
+    return np.asarray(binary_dilation(stands, np.ones(2 * reach + 1)), np.bool_)
 
 
 def recover_motion(sensor: Sensor, measured: Array, period: float) -> Array:

@@ -96,11 +96,15 @@ class SmoothedMotion(NamedTuple):
         Standard deviation of its error.
     rate_error : float
         Standard deviation of the error of its rate of change, in unit/s.
+    resolution : float
+        Time over which the filter spreads a sudden change, s: half a period of the highest
+        frequency that it passes.
     """
 
     motion: Array
     error: float
     rate_error: float
+    resolution: float
 
 
 def smooth(signal: Array, period: float) -> SmoothedMotion:
@@ -141,7 +145,8 @@ def smooth(signal: Array, period: float) -> SmoothedMotion:
     passed = (2 * math.pi * frequencies) ** 2 * gain
     rate_error = noise * math.sqrt(2 * period * float(np.sum(passed) * frequencies[1]))
     motion = _straighten_rests(smoothed, error, max(3, round(REST / period)))
-    return SmoothedMotion(motion, error, rate_error)
+    highest = frequencies[np.nonzero(gain)[0][-1]] if gain.any() else frequencies[1]
+    return SmoothedMotion(motion, error, rate_error, 0.5 / max(float(highest), 1e-300))
 
 
 def motion_band(signal: Array, period: float) -> float:

@@ -63,7 +63,7 @@ def find_gap(evidence: Evidence) -> GapTrace:
     lines = evidence.lines[0]
     predicted = evidence.predict(evidence.plant)[0]
     residual = evidence.residual_of([predicted])
-    freedom, counts = _freedom(lines), lines.fade > 0.5
+    freedom, counts = _freedom(lines), lines.counts
     power = _powers(lines, residual)
     # Subtracting tolerances needs many predictions, so it is done only if noise cannot explain it.
     if evidence.machine.tolerances and _is_large(power, counts, freedom):

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from rigtwin.components import Effect, RigPlant
+from rigtwin.diagnosis.lines import Lines
 from rigtwin.diagnosis.space import Space
 from rigtwin.numerics.arrays import Array
 
@@ -55,7 +56,7 @@ class LinearEvidence:
         """Signals in the time domain, shape (signals, ticks) for every recording."""
         self.machine = SimpleNamespace(prior=SimpleNamespace(even=even, error=0.05))
         self.plant = PLANT
-        self.lines = [_white_lines(signals) for signals in data]
+        self.lines = [lines_of(signals, np.ones(len(signals))) for signals in data]
         self._data, self._responses = data, responses
 
     def whiten(self, differences: Sequence[Array]) -> Array:
@@ -83,14 +84,18 @@ class LinearEvidence:
         return [np.full(lines.weight.shape, more) if more else None for lines in self.lines]
 
 
-def _white_lines(signals: Array) -> SimpleNamespace:
-    """Return lines that make white noise of unit variance a vector of unit variance."""
+def lines_of(signals: Array, noise: Array, fade: Array | None = None) -> Lines:
+    """Return lines of signals, shape (rows, ticks), with the weight of unit noise."""
     count, ticks = signals.shape
     weight = np.full((count, ticks // 2 - 1), np.sqrt(2.0 / ticks))
-    return SimpleNamespace(
+    return Lines(
+        frequency=np.fft.rfftfreq(ticks, 1e-3)[1 : 1 + weight.shape[1]],
         weight=weight,
+        spread=1.0 / weight**2,
+        fade=np.ones_like(signals) if fade is None else fade,
         measured=signals,
-        fade=np.ones((count, ticks)),
+        noise=noise,
+        bit=np.zeros(count),
         length=ticks,
-        noise=np.full(count, 1.0),
+        period=1e-3,
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -162,8 +163,8 @@ def test_a_recording_that_fills_half_its_transform_fills_all_its_blocks():
     half = np.zeros((2, 2400))
     half[:, :1200] = RANDOM.standard_normal((2, 1200))
     evidence = evidence_of()
-    evidence.lines[0].measured = half[:, :1200]
-    evidence.lines[0].fade = np.ones((2, 1200))
+    filled = replace(evidence.lines[0], measured=half[:, :1200], fade=np.ones((2, 1200)))
+    evidence.lines[0] = filled
     vector = np.concatenate([
         part.ravel()
         for signals in (half, SHORT)

@@ -16,8 +16,9 @@ from rigtwin.diagnosis.confidence import (
     relative_rest,
     support_of,
 )
+from rigtwin.diagnosis.lines import Lines
 from rigtwin.diagnosis.thresholds import STANDARD
-from tests.engine.linear import PLANT
+from tests.engine.linear import PLANT, lines_of
 
 VISCOUS, COULOMB = find("viscous@rail", PLANT), find("coulomb@rail", PLANT)
 ERROR, REST, MIMICRY, FORM = 0.05, 0.15, 0.17, 0.14
@@ -28,13 +29,12 @@ def logistic(ratio: float) -> float:
     return 0.0 if ratio <= 0.0 else 1.0 / (1.0 + ratio**-4.0)
 
 
-def recorded(signals: np.ndarray, noise: list[float], counted: int) -> SimpleNamespace:
+def recorded(signals: np.ndarray, noise: list[float], counted: int) -> Lines:
     """Return a recording of which only the first ticks count."""
     fade = np.zeros(signals.shape)
     fade[:, :counted] = 1.0
-    fade[0, :counted] = 0.0
     fade[:, counted:] = 0.5
-    return SimpleNamespace(measured=signals, fade=fade, noise=np.array(noise))
+    return lines_of(signals, np.array(noise), fade)
 
 
 SIGNALS = [
