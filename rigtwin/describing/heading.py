@@ -159,20 +159,6 @@ def read_words(words: tuple[str, ...], unit: str) -> Meaning:
     return Meaning(quantity, commanded, unknown)
 
 
-def is_position(column: str, unit: str = "") -> bool:
-    """Return whether a column's name says that it is a measured position.
-
-    Parameters
-    ----------
-    column
-        Name of the column.
-    unit
-        Unit that the file states for it; empty if it states none.
-    """
-    meaning = read_words(split_words(column), unit)
-    return meaning.quantity is JointQuantity.POSITION and not meaning.commanded
-
-
 def _without_adjective(words: tuple[str, ...]) -> set[str]:
     """Words without "current" where it is an adjective, as in "current position"."""
     # The letter q is no position here: a motor has a current in its q axis.

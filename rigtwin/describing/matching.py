@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from rigtwin.describing.heading import is_position, read_words, split_words, stated_unit
+from rigtwin.describing.heading import read_words, split_words, stated_unit
 from rigtwin.describing.joint_names import QUANTITY_WORDS, Alias, list_aliases, read_abbreviations
 from rigtwin.describing.match import NUMBERED, REMAINING, UNNAMED, Match
 from rigtwin.describing.numbered_columns import (
@@ -119,6 +119,7 @@ def _by_alias(
     """Best matches by a name of a joint, an actuator or a sensor within the column's name; several
     of different joints where they are equally good."""
     best: tuple[float, ...] = ()
+    path = split_words(column.rpartition("/")[0])
     matches: dict[str, Match] = {}
     for alias in aliases:
         at = _place(alias.words, words)
@@ -138,8 +139,11 @@ def _by_alias(
                 quantity = JointQuantity.POSITION
                 why += ", taken as the position"
         # More unknown words than known ones: the joint's name stands in it by chance. A part of the
-        # name is enough only where all other words have a meaning.
-        if len(meaning.unknown) > (0 if alias.is_part else len(alias.words)):
+        # name is enough only where all other words have a meaning. A path says where a signal is
+        # from.
+        strange = [word for word in meaning.unknown if word not in path]
+        in_path = at + len(alias.words) <= len(path)
+        if len(strange) > (0 if alias.is_part or in_path else len(alias.words)):
             continue
         # Fewer unknown words decide first, then the longer name: "left elbow" before "elbow".
         quality = (-len(meaning.unknown), len(alias.words), float(exact))
@@ -233,9 +237,9 @@ def _remaining(
     known = {word for joint in joints for word in split_words(joint)}
 
     def may_be_position(column: str) -> bool:
-        return is_position(column, columns.units.get(column, "")) and not (
-            known & set(split_words(column))
-        )
+        meaning = read_words(split_words(column), columns.units.get(column, ""))
+        is_position = meaning.quantity is JointQuantity.POSITION and not meaning.commanded
+        return is_position and not known & set(meaning.unknown)
 
     left = [
         column

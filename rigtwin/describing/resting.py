@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from rigtwin.describing.heading import is_position
+from rigtwin.describing.heading import read_words, split_words
 from rigtwin.describing.log import Log
 from rigtwin.describing.match import UNNAMED
 from rigtwin.describing.quantity import JointQuantity
@@ -22,7 +22,7 @@ def note_resting(log: Log, joints: Sequence[str], test: str) -> None:
     log.notes += [f"{j}: it follows {followed[j]} by an equality" for j in absent if j in followed]
     resting = [joint for joint in absent if joint not in followed]
     undecided = [j for j in resting if log.slots.stated(j, JointQuantity.POSITION) is None]
-    unnamed = [name for name, why in log.unused.items() if why == UNNAMED and is_position(name)]
+    unnamed = [name for name, why in log.unused.items() if why == UNNAMED and _is_position(name)]
     if undecided and unnamed:
         key = f"{undecided[0]}.position"
         question = ask(
@@ -37,3 +37,9 @@ def note_resting(log: Log, joints: Sequence[str], test: str) -> None:
             f"{enumerate_names(resting)}: no column is the position, so it stays where the model "
             "has it"
         )
+
+
+def _is_position(column: str) -> bool:
+    """Whether the words of a column's name say that it is a measured position."""
+    meaning = read_words(split_words(column), "")
+    return meaning.quantity is JointQuantity.POSITION and not meaning.commanded
