@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rigtwin.components.plant import with_parameters
 from rigtwin.models.forward_dynamics import ForwardDynamicsModel
 from rigtwin.models.initial_state import InitialState
 from rigtwin.models.start import read_start
@@ -90,27 +89,3 @@ def test_a_short_pendulum_upright_cannot_fall_within_a_window(rate: float, longe
     lengths = [0.002 * window.ticks for window in windows]
     assert min(lengths) >= SHORTEST
     assert max(lengths) <= longest
-
-
-@pytest.mark.parametrize("start", [(0.2, -0.1), (3.0, 0.5)])
-def test_a_neighbour_is_predicted_to_first_order_by_one_integration(
-    tmp_path: Path, start: tuple[float, float]
-) -> None:
-    machine = arm(tmp_path)
-    torques, angles = measured(start, 600)
-    observed = angles + NOISE * np.random.default_rng(4).standard_normal(angles.shape)
-    columns = {
-        "/command": dict(zip(("drive_1", "drive_2"), torques, strict=True)),
-        "/sensor": dict(zip(("angle_1", "angle_2"), observed, strict=True)),
-    }
-    record = recording(machine, columns)
-    exact = machine.physics.model(machine, record.inputs, machine.configuration_of(record), 2)
-    base = with_parameters(machine.plant, "shoulder", {"viscous": 1e-3})
-    for model in (exact, exact.thin(PERIOD)):
-        middle = model.predict(base)
-        np.testing.assert_allclose(model.predict_near(base, base), middle, atol=1e-9)
-        for group, change in (("shoulder", {"viscous": 2.5e-3}), ("angle_2", {"offset": 1e-3})):
-            moved = with_parameters(base, group, change)
-            response = model.predict(moved) - middle
-            error = model.predict_near(moved, base) - model.predict(moved)
-            assert np.std(error) < 0.2 * np.std(response)

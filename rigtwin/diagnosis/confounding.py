@@ -94,7 +94,7 @@ def _find_dependence(
     space = Space(evidence, fit.plant, effects=(*fit.effects, effect))
     value = _declared(effect, evidence)
     changed = with_values(fit.plant, (effect,), ((value * (1.0 + STEP),),))
-    response = (evidence.residual_near(changed, fit.plant) - base) / STEP
+    response = (evidence.residual(changed) - base) / STEP
     projected = space.project_out(np.column_stack([jacobian, response]))
     columns, target = projected[:, :-1], projected[:, -1]
     # The response is per unit of relative change, and its χ² grows with the square of that change.

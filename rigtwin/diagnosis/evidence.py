@@ -279,17 +279,9 @@ class Evidence:
         list of arrays
             Predicted signals of each recording, shape (rows, ticks).
         """
-        self._count_prediction()
-        return [model.predict(plant) for model in self.models]
-
-    def predict_near(self, plant: Plant, base: Plant) -> list[Array]:
-        """Predict as `predict` does, to first order in the distance of a plant from `base`."""
-        self._count_prediction()
-        return [model.predict_near(plant, base) for model in self.models]
-
-    def _count_prediction(self) -> None:
         if self.effort is not None:
             self.effort.add(sum(model.effort for model in self.models))
+        return [model.predict(plant) for model in self.models]
 
     def differences(self, plant: Plant) -> list[Array]:
         """Return measured less predicted signals without spikes.
@@ -373,10 +365,6 @@ class Evidence:
         """Return the whitened residual at a plant, shape (size,)."""
         return self.whiten(self.differences(plant))
 
-    def residual_near(self, plant: Plant, base: Plant) -> Array:
-        """Return the whitened residual to first order in the distance of a plant from `base`."""
-        return self.whiten(self._subtract(self.predict_near(plant, base)))
-
     def residual_of(self, predictions: Sequence[Array]) -> Array:
         """Return the whitened residual of given predictions, shape (rows, ticks) per recording."""
         return self.whiten(self._subtract(predictions))
@@ -426,12 +414,12 @@ class Evidence:
             if tolerance.is_idle(plant):
                 columns.append(np.zeros(sum(2 * lines.weight.size for lines in self.lines)))
                 continue
-            after, scale = self.predict_near(tolerance.shift(plant, width), plant), 1.0
+            after, scale = self.predict(tolerance.shift(plant, width)), 1.0
             start = before
             if tolerance.mechanical and width > 0.0:
                 # Stick and slip respond differently to a rise and a fall of a parameter. A central
                 # difference cancels half of that asymmetry.
-                start, scale = self.predict_near(tolerance.shift(plant, -width), plant), 0.5
+                start, scale = self.predict(tolerance.shift(plant, -width)), 0.5
             columns.append(
                 self.whiten([scale * (b - a) for a, b in zip(start, after, strict=True)])
             )

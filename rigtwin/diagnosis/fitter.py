@@ -17,7 +17,6 @@ import numpy as np
 from rigtwin.components import Effect, Guide, Starts
 from rigtwin.components.guide import resists
 from rigtwin.components.plant import Plant, component_of
-from rigtwin.diagnosis.effect_residual import EffectResidual
 from rigtwin.diagnosis.effect_starts import EffectStarts
 from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.fit import Fit, Values, is_possible, with_values
@@ -364,23 +363,31 @@ class Fitter:
         space, base = space or self.space, base or self.plant
         if not effects:
             return Fit((), (), space.misfit(self.evidence.residual(base)), (), self.plant)
-        residual = EffectResidual(self.evidence, base, effects)
+        sizes = [len(effect.kind.parameters) for effect in effects]
         steps = np.concatenate([self.starts(effect).steps for effect in effects])
+
+        def split(vector: Array) -> Values:
+            cuts = np.cumsum(sizes)[:-1]
+            return tuple(tuple(part.tolist()) for part in np.split(vector, cuts))
+
+        def residual(vector: Array) -> Array:
+            return self.evidence.residual(with_values(base, effects, split(vector)))
+
         # The plant of the result is the nominal one with the effects, even where `base` has its
         # tolerances moved: a finding is about effects alone.
         minimum = minimise(
             residual,
             space,
-            residual.join(start),
+            np.concatenate([np.asarray(values, float) for values in start]),
             steps,
             self.bounds(effects),
             self.evidence.expected,
         )
-        values = residual.split(minimum.values)
+        values = split(minimum.values)
         return Fit(
             effects,
             values,
             minimum.misfit,
-            residual.split(minimum.widths),
+            split(minimum.widths),
             with_values(self.plant, effects, values),
         )

@@ -11,8 +11,8 @@ and tries the shares 1, 0.5, 0.2 and 0.05 of the move m until the misfit falls
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
@@ -43,18 +43,6 @@ SHORTEST_STEP = 1e-3
 """Shortest step of a derivative, as a share of the given step."""
 
 
-class ResidualFunction(Protocol):
-    """Whitened residual as a function of the values of parameters."""
-
-    def __call__(self, vector: Array) -> Array:
-        """Return the residual at some values, shape (size,)."""
-        ...
-
-    def near(self, vector: Array, at: Array) -> Array:
-        """Return the residual to first order in the distance from the values `at`."""
-        ...
-
-
 @dataclass(frozen=True)
 class Minimum:
     """Result of a minimisation.
@@ -75,7 +63,7 @@ class Minimum:
 
 
 def minimise(
-    residual: ResidualFunction,
+    residual: Callable[[Array], Array],
     space: Space,
     start: Array,
     steps: Array,
@@ -87,7 +75,7 @@ def minimise(
     Parameters
     ----------
     residual
-        Whitened residual as a function of the values.
+        Function of the values, shape (parameters,), that returns the whitened residual.
     space
         Tolerances that are free beside the parameters.
     start, steps
@@ -135,7 +123,7 @@ def minimise(
 
 
 def _try_move(
-    residual: ResidualFunction,
+    residual: Callable[[Array], Array],
     space: Space,
     values: Array,
     move: Array,
@@ -201,14 +189,14 @@ def shorten(jacobian: Array, misfit: float) -> Array:
 
 
 def take_derivatives(
-    residual: ResidualFunction, values: Array, current: Array, steps: Array, high: Array
+    residual: Callable[[Array], Array], values: Array, current: Array, steps: Array, high: Array
 ) -> Array:
     """Return the change of a residual for a step of each parameter, by one-sided differences.
 
     Parameters
     ----------
     residual
-        Residual as a function of the values.
+        Function of the values, shape (parameters,).
     values, current
         Values, and the residual at them.
     steps
@@ -228,5 +216,5 @@ def take_derivatives(
         sign = 1.0 if values[number] + step <= high[number] else -1.0
         shifted = values.copy()
         shifted[number] += sign * step
-        columns.append(sign * (residual.near(shifted, values) - current))
+        columns.append(sign * (residual(shifted) - current))
     return np.stack(columns, axis=1)

@@ -9,9 +9,8 @@ import numpy as np
 from rigtwin.components.plant import Plant
 from rigtwin.description.machine import Machine
 from rigtwin.diagnosis.effect_fit import FittedParameter
-from rigtwin.diagnosis.effect_residual import EffectResidual
 from rigtwin.diagnosis.evidence import Evidence, relative_errors
-from rigtwin.diagnosis.fit import Fit
+from rigtwin.diagnosis.fit import Fit, with_values
 from rigtwin.diagnosis.fitter import Fitter
 from rigtwin.diagnosis.gauss_newton import take_derivatives
 from rigtwin.diagnosis.scoring import Scorer
@@ -46,8 +45,13 @@ def find_covariance(fitter: Fitter, fit: Fit) -> Array:
     evidence = fitter.evidence
     base = fit.base if fit.base is not None else evidence.plant
     steps = np.concatenate([fitter.starts(effect).steps for effect in fit.effects])
-    residual = EffectResidual(evidence, base, fit.effects)
-    optimum = residual.join(fit.values)
+    cuts = np.cumsum([len(values) for values in fit.values])[:-1]
+
+    def residual(vector: Array) -> Array:
+        values = [tuple(part.tolist()) for part in np.split(vector, cuts)]
+        return evidence.residual(with_values(base, fit.effects, values))
+
+    optimum = np.concatenate([np.asarray(values, float) for values in fit.values])
     rest = residual(optimum)
     low, high = fitter.bounds(fit.effects)
     jacobian = take_derivatives(residual, optimum, rest, steps, high)

@@ -13,7 +13,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from rigtwin.components import Effect
-from rigtwin.diagnosis.effect_residual import EffectResidual
 from rigtwin.diagnosis.fit import Fit, Values, is_possible, with_values
 from rigtwin.diagnosis.fitter import Fitter
 from rigtwin.diagnosis.gauss_newton import DAMPING, take_derivatives
@@ -41,19 +40,28 @@ class Linearised:
 
     def __init__(self, fitter: Fitter, fit: Fit) -> None:
         self._fitter, self.fit = fitter, fit
-        self._at = EffectResidual(fitter.evidence, fitter.plant, fit.effects)
+        self._sizes = [len(effect.kind.parameters) for effect in fit.effects]
         # Number of the effect that each parameter of the flat vector belongs to.
-        self._owner = np.repeat(np.arange(len(fit.effects)), self._at.sizes)
+        self._owner = np.repeat(np.arange(len(self._sizes)), self._sizes)
         self._steps = np.concatenate([fitter.starts(effect).steps for effect in fit.effects])
-        self._values = self._at.join(fit.values)
+        self._values = np.concatenate([np.asarray(values, float) for values in fit.values])
         self._bounds = fitter.bounds(fit.effects)
-        self._residual = self._at(self._values)
+
+        def residual(vector: Array) -> Array:
+            plant = with_values(fitter.plant, fit.effects, self._split(vector))
+            return fitter.evidence.residual(plant)
+
+        self._residual = residual(self._values)
         self._jacobian = take_derivatives(
-            self._at, self._values, self._residual, self._steps, self._bounds[1]
+            residual, self._values, self._residual, self._steps, self._bounds[1]
         )
         normal, self._gradient = fitter.space.normal_equations(self._jacobian, self._residual)
         # The same damping as in the fit keeps the matrix regular where a parameter has no response.
         self._normal = normal + np.diag(DAMPING * np.diag(normal) + 1e-12)
+
+    def _split(self, vector: Array) -> Values:
+        cuts = np.cumsum(self._sizes)[:-1]
+        return tuple(tuple(part.tolist()) for part in np.split(vector, cuts))
 
     def columns_of(self, subset: Sequence[int]) -> Array:
         """Return the responses to a step of each parameter of some effects, shape (size, n)."""
@@ -63,13 +71,13 @@ class Linearised:
         """Return the values of some effects, moved by a number of steps each, within bounds."""
         moves = np.zeros(len(self._values))
         moves[np.isin(self._owner, subset)] = steps
-        values = self._at.split(np.clip(self._values + moves * self._steps, *self._bounds))
+        values = self._split(np.clip(self._values + moves * self._steps, *self._bounds))
         return tuple(values[number] for number in subset)
 
     @property
     def misfit(self) -> float:
         """Misfit with all effects, once they are refitted to the fitter's own evidence."""
-        return self._keep_only(range(len(self.fit.effects)))[0]
+        return self._keep_only(range(len(self._sizes)))[0]
 
     def leave_out_each(self) -> list[Reduced]:
         """Leave out each effect in turn, and refit the others.
@@ -80,9 +88,7 @@ class Linearised:
             Misfit, remaining effects and their values, the least misfit first. Sets in which an
             effect lacks the dry friction that it acts through are omitted.
         """
-        reduced = [
-            self._as_they_are(each) for each in self._leave_out(range(len(self.fit.effects)))
-        ]
+        reduced = [self._as_they_are(each) for each in self._leave_out(range(len(self._sizes)))]
         return sorted(reduced, key=lambda result: result[0])
 
     def _as_they_are(self, reduced: Reduced) -> Reduced:
@@ -141,5 +147,5 @@ class Linearised:
         # The linear prediction suffices to rank subsets, and costs no simulation. The best of them
         # are fitted from these values, which therefore have to be within their bounds.
         misfit = self._fitter.space.misfit(self._residual + self._jacobian @ move)
-        values = self._at.split(np.clip(self._values + move * self._steps, *self._bounds))
+        values = self._split(np.clip(self._values + move * self._steps, *self._bounds))
         return misfit, tuple(values[number] for number in subset)

@@ -16,6 +16,7 @@ follows from the products J'J, J'r and r'r of every block, so that judging a fit
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -27,8 +28,7 @@ from rigtwin.diagnosis.blocks import (
     count_samples,
     excess_by_band,
 )
-from rigtwin.diagnosis.effect_residual import EffectResidual
-from rigtwin.diagnosis.fit import Fit, Values
+from rigtwin.diagnosis.fit import Fit, Values, with_values
 from rigtwin.diagnosis.fitter import Fitter
 from rigtwin.diagnosis.gauss_newton import shorten, take_derivatives
 from rigtwin.diagnosis.left_out_blocks import cross_validate, normal_matrix, standard_errors
@@ -133,10 +133,17 @@ class Scorer:
     def _score(self, fit: Fit) -> Scored:
         evidence, fitter = self._evidence, self._fitter
         base = fitter.plant if fit.base is None else fit.base
-        residual_at = EffectResidual(evidence, base, fit.effects)
+        sizes = [len(effect.kind.parameters) for effect in fit.effects]
+        count = sum(sizes)
+
+        def residual_at(vector: Array) -> Array:
+            return evidence.residual(with_values(base, fit.effects, _split(vector, sizes)))
+
         space = fitter.space.without_replaced(fit.effects)
-        values = residual_at.join(fit.values)
-        count, residual = len(values), residual_at(values)
+        values = (
+            np.concatenate([np.asarray(v, float) for v in fit.values]) if count else np.zeros(0)
+        )
+        residual = residual_at(values)
         used = np.array(fit.used) if fit.used else np.zeros(space.columns.shape[1])
         columns, steps = self._derive(fit, residual_at, values, residual)
         # Tolerances at their bound are fixed there; the others are free about their estimate.
@@ -171,7 +178,7 @@ class Scorer:
         moves = self._moves(fit, values, steps)
         return replace(
             scored,
-            widths=residual_at.split(standard_errors(products, expected, prior, count) * steps),
+            widths=_split(standard_errors(products, expected, prior, count) * steps, sizes),
             reach=_reach(moves, products),
             together=_together(moves, products),
             accounts=self._accounts(moves, products, prior),
@@ -180,7 +187,7 @@ class Scorer:
         )
 
     def _derive(
-        self, fit: Fit, residual_at: EffectResidual, values: Array, residual: Array
+        self, fit: Fit, residual_at: Callable[[Array], Array], values: Array, residual: Array
     ) -> tuple[Array, Array]:
         """Return the change of the residual by a step of each value, and these steps."""
         if not fit.effects:
@@ -261,3 +268,9 @@ def _reach(moves: Array, products: Array) -> Array:
 def _pad(values: Array, count: int) -> Array:
     """Put zeros before values: the effects' parameters have no prior."""
     return np.concatenate([np.zeros(count), values])
+
+
+def _split(vector: Array, sizes: Sequence[int]) -> Values:
+    """Cut a vector of all parameters into the values of each effect."""
+    cuts = np.cumsum(sizes)[:-1]
+    return tuple(tuple(part.tolist()) for part in np.split(vector, cuts)) if len(sizes) else ()

@@ -9,7 +9,6 @@ from itertools import product
 import numpy as np
 
 from rigtwin.components.plant import Plant
-from rigtwin.diagnosis.effect_residual import EffectResidual
 from rigtwin.diagnosis.effect_starts import LIMITS
 from rigtwin.diagnosis.fit import Fit, with_values
 from rigtwin.diagnosis.fitter import Fitter
@@ -81,7 +80,6 @@ def _perturb(fitter: Fitter, fit: Fit, space: Space, base: Plant, restarts: Sequ
     """
     if is_sufficient(fit.misfit, fitter.evidence.expected, SUFFICIENT_RATIO):
         return fit
-    residual = EffectResidual(fitter.evidence, base, fit.effects)
     for number, effect in enumerate(fit.effects):
         fitted = len(effect.kind.parameters) - len(effect.kind.constants)
         for place, share in product(range(fitted), restarts):
@@ -93,9 +91,10 @@ def _perturb(fitter: Fitter, fit: Fit, space: Space, base: Plant, restarts: Sequ
             nominal = 0.0 if from_zero else effect.nominal(fitter.plant)[effect.kind.parameters[0]]
             perturbed[place] = nominal + share * (perturbed[place] - nominal)
             values = (*fit.values[:number], tuple(perturbed), *fit.values[number + 1 :])
-            # To first order is enough here: the refit simulates.
-            moved = residual.near(residual.join(values), residual.join(fit.values))
-            if space.misfit(moved) < fit.misfit:
+            if (
+                space.misfit(fitter.evidence.residual(with_values(base, fit.effects, values)))
+                < fit.misfit
+            ):
                 fit = min(
                     fit,
                     fitter.refine(fit.effects, values, space, base),

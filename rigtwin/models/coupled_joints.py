@@ -276,32 +276,14 @@ class CoupledJoints:
 
         def compute() -> Array:
             integrate = self._prepare(plant, shifts or {}, disturbance, guide_disturbance)
-            return self._move_from(self._starts_of(plant), integrate)
+            parts = [
+                integrate(start, window.first, window.last)
+                for window, start in zip(self._starts.windows, self._starts_of(plant), strict=True)
+            ]
+            return clip_diverged(parts[0] if len(parts) == 1 else np.concatenate(parts, axis=2))
 
         plain = disturbance is None and guide_disturbance is None and not shifts
         return self._last.recall(self._key(plant), compute) if plain else compute()
-
-    def _move_from(self, starts: Array, integrate: Callable[[Array, int, int], Array]) -> Array:
-        """Return the motion of all windows from their initial states, as `move` does."""
-        parts = [
-            integrate(start, window.first, window.last)
-            for window, start in zip(self._starts.windows, starts, strict=True)
-        ]
-        return clip_diverged(parts[0] if len(parts) == 1 else np.concatenate(parts, axis=2))
-
-    def _sense_near(self, plant: Plant, base: Plant) -> Array:
-        """Return what the sensors read from the initial states of `base`, corrected for errors.
-
-        In the distance of the plant from `base`, this is the prediction to first order.
-        """
-        near = self._starts.near(base, self._key(base), self._sense_from(base))
-        moved = self._move_from(near.of(plant), self._prepare(plant, {}))
-        predicted = near.correct(self._sense(plant, moved))
-        if self._starts.linear:
-            return predicted
-        # Damped least squares ends before its gradient is zero, and that is no response.
-        fitted = self._sense(base, self.move(base))
-        return predicted + fitted - near.correct(fitted)
 
     # Sensors
 

@@ -129,11 +129,6 @@ class ForwardDynamicsModel(CoupledJoints, Model[Plant]):
         predicted = self._sense(plant, self.move(plant))
         return self._starts.correct(plant, self._key(plant), self._sense_from(plant), predicted)
 
-    def predict_near(self, plant: Plant, base: Plant) -> Array:
-        if not self._starts.may_be_linear:
-            return self.predict(plant)
-        return self._sense_near(plant, base)
-
     def predict_disturbed(self, plant: Plant, entry: str, amount: Array) -> Array:
         if entry in self._layout.guides:
             guide_disturbance = np.zeros((len(self._layout.guides), self._ticks))

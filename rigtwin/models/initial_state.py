@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from copy import copy
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -88,8 +87,6 @@ class Judged:
         Ticks for which the machine remembers its initial state.
     responses : Array
         Change of all rows by each error, shape (all rows, all ticks, unknowns).
-    weights : Array or None
-        Weight of each row, shape (rows,). None where each residual has weights of its own.
     """
 
     rows: tuple[int, ...]
@@ -99,15 +96,6 @@ class Judged:
     slopes: Array
     ticks: int
     responses: Array
-    weights: Array | None = None
-
-    def weigh(self, residual: Array) -> Array:
-        """Return the weight of each row in a fit that leaves a residual, shape (rows,)."""
-        if self.weights is not None:
-            return self.weights
-        # A wrong model must not be blamed on the initial state: its residual widens the tolerance.
-        power = np.einsum("rt,rt->r", residual, residual) / self.ticks
-        return 1.0 / np.maximum(self.held**2, power)
 
     @cached_property
     def squares(self) -> Array:
@@ -301,53 +289,13 @@ class InitialState:
             The moved state, shape (2, coordinates), and by how many standard errors, shape
             (unknowns,).
         """
-        errors = np.zeros(2 * self.loose)
-        if self._judged is not None:
-            errors = self._solve(predicted, errors)
-        return self.displace(plant, errors), errors
-
-    def relative_to_read(self, plant: Plant, state: Array) -> Array:
-        """Return how far a state is from the state as read, in standard errors, (unknowns,).
-
-        It is 0 where errors of the state are not visible.
-        """
-        if self._judged is None:
-            return np.zeros(2 * self.loose)
-        return (self._free(state) - self._free(self.read(plant))) / self._judged.errors
-
-    def displace(self, plant: Plant, errors: Array) -> Array:
-        """Return the state as read, displaced by some standard errors, shape (2, coordinates)."""
         state = self.read(plant)
-        if self._judged is not None:
-            displaced = self._free(state) + errors * self._judged.errors
-            state[:, : self.loose] = displaced.reshape(2, -1)
-        return state
-
-    def respond_at(self, state: Array, sense: Sense) -> InitialState:
-        """Return this initial state with the responses of another machine or state.
-
-        Parameters
-        ----------
-        state
-            State about which it is displaced, shape (2, coordinates).
-        sense
-            Prediction from any initial state.
-        """
-        judged = self._judged
-        if judged is None:
-            return self
-        predicted = sense(state, judged.responses.shape[1])
-        responses = self._respond(state, sense, judged.errors, predicted)
-        rows, ticks = list(judged.rows), judged.ticks
-        moved = copy(self)
-        moved._judged = replace(
-            judged,
-            responses=responses,
-            slopes=responses[rows, :ticks].reshape(-1, len(judged.errors)),
-            # The weights belong to the fit at this state and not to its neighbours.
-            weights=judged.weigh(judged.measured - predicted[rows, :ticks]),
-        )
-        return moved
+        if self._judged is None:
+            return state, np.zeros(2 * self.loose)
+        errors = self._solve(predicted, np.zeros(2 * self.loose))
+        moved = self._free(state) + errors * self._judged.errors
+        state[:, : self.loose] = moved.reshape(2, -1)
+        return state, errors
 
     def _solve(self, predicted: Array, moved: Array) -> Array:
         """Return the errors of the initial state, in standard errors, shape (unknowns,).
@@ -359,7 +307,9 @@ class InitialState:
         judged = self._judged
         assert judged is not None
         residual = judged.measured - predicted[list(judged.rows), : judged.ticks]
-        weights = judged.weigh(residual)
+        # A wrong model must not be blamed on the initial state: its residual widens the tolerance.
+        power = np.einsum("rt,rt->r", residual, residual) / judged.ticks
+        weights = 1.0 / np.maximum(judged.held**2, power)
         count = len(moved)
         normal = (weights @ judged.squares.reshape(len(weights), -1)).reshape(count, count)
         normal.ravel()[:: count + 1] += 1.0 / LIKELY**2

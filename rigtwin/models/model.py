@@ -56,14 +56,6 @@ class Model(ABC, Generic[P]):
     def predict(self, plant: P) -> Array:
         """Return the signals without noise, shape (rows, ticks)."""
 
-    def predict_near(self, plant: P, base: P) -> Array:
-        """Return `predict` to first order in the distance of a plant from another one.
-
-        Where initial states are fitted, those of `base` are corrected to first order, which takes
-        one integration instead of several. Elsewhere this is `predict`.
-        """
-        return self.predict(plant)
-
     @abstractmethod
     def predict_true(self, plant: P) -> Array:
         """Return what ideal sensors would read, shape (rows, ticks)."""

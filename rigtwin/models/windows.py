@@ -10,7 +10,7 @@ techniques for ODE, in: Numerical Treatment of Inverse Problems (1983) 95].
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -27,11 +27,6 @@ STEADY = 1.5
 """Growth up to which an initial error is corrected once."""
 SHORTEST, FEWEST = 0.15, 40
 """Shortest window: time, s, and number of ticks. Each window costs two unknowns per joint."""
-
-
-NEARBY = 4
-"""Number of plants whose responses to the initial states are kept: they are large, and each thread
-fits about one plant at a time."""
 
 
 Sense = Callable[[Array, int, int], Array]
@@ -59,11 +54,6 @@ class Window:
     def ticks(self) -> int:
         """Length of the window."""
         return self.last - self.first
-
-    def respond_at(self, start: Array, sense: Sense) -> Window:
-        """Return the window with the responses of the predictions to a displaced `start`."""
-        state = self.state.respond_at(start, lambda at, n: sense(at, self.first, self.first + n))
-        return replace(self, state=state)
 
 
 def divide(
@@ -94,36 +84,6 @@ def divide(
     return tuple(part for half in halves for part in divide(*half, period, judge))
 
 
-@dataclass(frozen=True)
-class NearbyStarts:
-    """Initial states of one plant, from which those of its neighbours follow to first order.
-
-    Attributes
-    ----------
-    windows : tuple of Window
-        Windows, each with the responses of the predictions to its initial state.
-    errors : Array
-        Distance of each state from the one that the sensors show, in standard errors, shape
-        (windows, unknowns).
-    """
-
-    windows: tuple[Window, ...]
-    errors: Array
-
-    def of(self, plant: Plant) -> Array:
-        """Return the initial states with a neighbour's sensors, shape (windows, 2, coordinates)."""
-        pairs = zip(self.windows, self.errors, strict=True)
-        return np.stack([window.state.displace(plant, errors) for window, errors in pairs])
-
-    def correct(self, predicted: Array) -> Array:
-        """Correct a prediction from these states for their errors, shape (rows, ticks)."""
-        corrected = predicted.copy()
-        for window, errors in zip(self.windows, self.errors, strict=True):
-            part = slice(window.first, window.last)
-            corrected[:, part] = window.state.correct(predicted[:, part], errors)
-        return corrected
-
-
 class WindowStarts:
     """Initial states from which the windows of a recording are predicted.
 
@@ -149,7 +109,6 @@ class WindowStarts:
         self.windows, self.linear = windows, linear
         self._found: Memo[Array] = Memo(remembered)
         self._moved: Memo[tuple[Array, Array]] = Memo(remembered)
-        self._near: Memo[NearbyStarts] = Memo(NEARBY)
 
     @property
     def may_be_linear(self) -> bool:
@@ -193,27 +152,12 @@ class WindowStarts:
         """
         if not self.linear:
             return predicted
-        return NearbyStarts(self.windows, self._move(plant, key, sense)[1]).correct(predicted)
-
-    def near(self, plant: Plant, key: Hashable, sense: Sense) -> NearbyStarts:
-        """Return the initial states of a plant, from which those of its neighbours follow.
-
-        Parameters
-        ----------
-        plant, key, sense
-            Machine, as for `of`.
-        """
-        return self._near.recall(key, lambda: self._respond(plant, key, sense))
-
-    def _respond(self, plant: Plant, key: Hashable, sense: Sense) -> NearbyStarts:
-        if self.linear:
-            errors = self._move(plant, key, sense)[1]
-            return NearbyStarts(self.windows, errors)
-        pairs = list(zip(self.windows, self.of(plant, key, sense), strict=True))
-        errors = [window.state.relative_to_read(plant, start) for window, start in pairs]
-        return NearbyStarts(
-            tuple(window.respond_at(start, sense) for window, start in pairs), np.stack(errors)
-        )
+        corrected = predicted.copy()
+        moved = self._move(plant, key, sense)[1]
+        for window, errors in zip(self.windows, moved, strict=True):
+            part = slice(window.first, window.last)
+            corrected[:, part] = window.state.correct(predicted[:, part], errors)
+        return corrected
 
     def _read(self, plant: Plant) -> Array:
         """Return the initial states as read, shape (windows, 2, coordinates)."""

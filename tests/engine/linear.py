@@ -75,9 +75,6 @@ class LinearEvidence:
         ]
         return self.whiten(left)
 
-    def residual_near(self, plant: RigPlant, base: RigPlant) -> Array:
-        return self.residual(plant)
-
     def excess_noise(self, plant: RigPlant) -> list[Array | None]:
         """Return a tenth of the noise more for every newton of the rail's asymmetry."""
         more = 0.1 * plant.rail.asymmetry

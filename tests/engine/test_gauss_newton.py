@@ -29,12 +29,9 @@ class Recorder:
         self._residual = residual
         self.places: list[list[float]] = []
 
-    def __call__(self, vector: Array) -> Array:
-        self.places.append(vector.tolist())
-        return self._residual(vector)
-
-    def near(self, vector: Array, at: Array) -> Array:
-        return self(vector)
+    def __call__(self, values: Array) -> Array:
+        self.places.append(values.tolist())
+        return self._residual(values)
 
 
 def linear(values: Array) -> Array:
@@ -48,7 +45,6 @@ def solve(
     here = np.array(start)
     wide = (np.full(len(start), -1e6), np.full(len(start), 1e6)) if bounds is None else bounds
     space = no_tolerances(len(residual(here)))
-    residual = residual if isinstance(residual, Recorder) else Recorder(residual)
     return minimise(residual, space, here, np.array(steps), wide, expected)
 
 
@@ -191,8 +187,7 @@ def test_beside_free_tolerances_the_covariance_is_that_of_the_joint_least_square
     data = 0.2 * DATA
     best = np.linalg.solve(normal, joint.T @ data)
     assert np.all(np.abs(best[3:]) < 1.0)
-    residual = Recorder(lambda v: data - RESPONSES @ v)
-    found = minimise(residual, space, np.zeros(3), np.full(3, 0.1), FAR, 10.0)
+    found = minimise(lambda v: data - RESPONSES @ v, space, np.zeros(3), np.full(3, 0.1), FAR, 10.0)
     np.testing.assert_allclose(found.values, best[:3], rtol=1e-4)
     widths = np.sqrt(np.diag(np.linalg.inv(normal))[:3])
     np.testing.assert_allclose(found.widths, widths, rtol=1e-9)
