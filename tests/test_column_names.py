@@ -205,3 +205,35 @@ def test_a_moment_about_an_axis_is_a_joints_force_beside_its_name_alone(tmp_path
     del columns["Mz_shaft"]
     with pytest.raises(RigtwinError, match="no column is a measured force"):
         sources(tmp_path, SHAFT, columns)
+
+
+GANTRY = """<mujoco><worldbody>
+<body name="a"><joint name="X" type="slide" axis="1 0 0"/><geom size="0.1" mass="5"/>
+<body name="b"><joint name="Y" type="slide" axis="0 1 0"/><geom size="0.1" mass="2"/></body></body>
+</worldbody><actuator><general name="mx" joint="X" gainprm="60"/>
+<general name="my" joint="Y" gainprm="40"/></actuator></mujoco>"""
+WHEEL = """<mujoco><worldbody><body name="rod"><joint name="pivot" axis="0 1 0"/>
+<geom type="capsule" fromto="0 0 0 0 0 -0.2" size="0.01" mass="0.2"/>
+<body name="disc" pos="0 0 -0.2"><joint name="wheel" axis="0 1 0" damping="0.01"/>
+<geom type="cylinder" size="0.05 0.01" euler="90 0 0" mass="0.4"/></body></body></worldbody>
+<actuator><motor name="bldc" joint="wheel"/></actuator></mujoco>"""
+
+
+@pytest.mark.parametrize("name", ["I_X_A", "i_x_A"])
+def test_a_current_may_be_called_i_with_its_axis(name: str) -> None:
+    assert split_words(name) == ("current", "x", "amp")
+    assert split_words("theta_A") == ("theta", "a")
+
+
+def test_the_only_position_left_is_that_of_the_only_joint_left(tmp_path: Path) -> None:
+    columns = {"pend_angle_deg": SWING, "wheel_angle_deg": SWING, "wheel_torque_Nm": SWING}
+    found = sources(tmp_path, WHEEL, columns)
+    assert found["pivot.position"] == "pend_angle_deg"
+
+
+def test_the_path_of_a_column_says_where_its_signal_is_from(tmp_path: Path) -> None:
+    prefix = "Model Root/Bench/left cell/"
+    columns = {f"{prefix}{name}": SWING for name in ("X_pos_mm", "Y_pos_mm", "X_force", "Y_force")}
+    found = sources(tmp_path, GANTRY, columns)
+    assert found["X.position"] == f"{prefix}X_pos_mm"
+    assert found["Y.position"] == f"{prefix}Y_pos_mm"
