@@ -17,7 +17,7 @@ from rigtwin.models.following import follow_command
 from rigtwin.models.joint import JointModel
 from rigtwin.models.joint_inverse import inverse_dynamics
 from rigtwin.models.joint_motion import Inertia
-from rigtwin.models.measured_motion import is_at_rest
+from rigtwin.models.measured_motion import may_be_at_rest
 from rigtwin.recording import RecordedTest
 from rigtwin.signals.motion import smooth
 from tests.helpers.described import described, recording_of
@@ -276,7 +276,7 @@ def test_a_joint_stands_where_its_velocity_is_within_its_error() -> None:
     moving = np.abs(np.gradient(true, PERIOD)) > 0.02
     # The error of the velocity is that of the filter's passband.
     assert np.std((rate - np.gradient(true, PERIOD))[moving]) < 3.0 * rate_error
-    stands = is_at_rest(rate, rate_error, resolution, PERIOD)
+    stands = may_be_at_rest(rate, rate_error, resolution, PERIOD)
     # Around the stops is left out what the filter cannot tell from them, and nothing else.
     assert 0.005 < resolution < 0.05
     distance = np.minimum(np.abs(time - 1.25), np.abs(time - 2.25))

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
 
 import rigtwin
 from rigtwin.components import with_parameters
 from rigtwin.description.mechanism import Mechanism
+from rigtwin.errors import RigtwinError
 
 LIFT = """
 <mujoco>
@@ -62,3 +64,60 @@ def test_a_load_on_a_balanced_lift_has_its_whole_weight(tmp_path: Path) -> None:
     inside = slice(400, -400)
     expected = 6.0 * (9.81 + acceleration)
     assert np.max(np.abs(change - expected)[inside]) < 0.02 * np.max(expected)
+
+
+FINGER = """
+<mujoco>
+  <default><joint damping="0.02" armature="1e-3"/></default>
+  <worldbody>
+    <body name="middle"><joint name="PIP" axis="0 1 0"/>
+      <geom type="capsule" fromto="0 0 0 .03 0 0" size=".008"/>
+      <body name="distal" pos=".03 0 0"><joint name="DIP" axis="0 1 0"/>
+        <geom type="capsule" fromto="0 0 0 .02 0 0" size=".007"/></body></body>
+  </worldbody>
+  <equality><joint joint1="DIP" joint2="PIP" polycoef="0 0.7 0 0 0"/></equality>
+  <actuator><position name="servo" joint="PIP" kp="2" kv="0.05"/></actuator>
+</mujoco>
+"""
+
+
+MOTORS = '<motor name="drive_1" joint="MCP"/><motor name="drive_2" joint="PIP"/>'
+
+
+def test_a_measured_joint_that_follows_a_servo_is_left_out(tmp_path: Path) -> None:
+    (tmp_path / "finger.xml").write_text(FINGER)
+    time = 0.004 * np.arange(1000)
+    angle = 0.5 * np.sin(3.0 * time) + 0.2 * np.sin(7.0 * time)
+    log = {"time": time, "cmd_PIP": angle, "meas_PIP": angle, "meas_DIP": 0.7 * angle}
+    described = rigtwin.describe(tmp_path / "finger.xml", log)
+    assert described.reading.joints == ("PIP",)
+    assert "DIP: it follows PIP by an equality" in described.reading.notes
+
+
+def test_a_follower_is_asked_for_where_the_forces_of_several_joints_are_judged(
+    tmp_path: Path,
+) -> None:
+    base = '<body name="base"><joint name="MCP" axis="0 1 0"/><geom size=".01"/><body name="middle"'
+    arm = FINGER.replace('<body name="middle"', base).replace("</worldbody>", "</body></worldbody>")
+    arm = arm.replace('<position name="servo" joint="PIP" kp="2" kv="0.05"/>', MOTORS)
+    (tmp_path / "finger.xml").write_text(arm)
+    time = 0.004 * np.arange(1000)
+    angle = 0.5 * np.sin(3.0 * time) + 0.2 * np.sin(7.0 * time)
+    place = np.outer(angle, [1.0, -0.8, 0.7])
+    model = mujoco.MjModel.from_xml_string(arm)
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
+    data, torques = mujoco.MjData(model), []
+    speed = np.gradient(place, time, axis=0)
+    for data.qpos, data.qvel, data.qacc in zip(
+        place, speed, np.gradient(speed, time, axis=0), strict=True
+    ):
+        mujoco.mj_inverse(model, data)
+        torques.append(data.qfrc_inverse.copy())
+    log = {
+        "time": time,
+        "MCP_torque": np.array(torques)[:, 0],
+        "PIP_torque": np.array(torques)[:, 1],
+    }
+    log |= {f"{name}_pos": place[:, n] for n, name in enumerate(("MCP", "PIP", "DIP"))}
+    with pytest.raises(RigtwinError, match="DIP"):
+        rigtwin.describe(tmp_path / "finger.xml", log)

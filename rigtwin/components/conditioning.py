@@ -107,8 +107,7 @@ def actuator(component: Motor | Cylinder | Pusher, computer: Computer, timestep:
         neutral=neutral,
         low=component.command_low if isinstance(component, PUSHERS) else -UNLIMITED,
         high=component.command_high if isinstance(component, PUSHERS) else UNLIMITED,
-        # A search may try a drive that is far ahead of its command, which no ring buffer holds.
-        delay=max(delay / timestep, -2.0),
+        delay=delay / timestep,
         deadband=deadband,
         zero_centred=not isinstance(component, Cylinder | Servo),
         reach=reach,

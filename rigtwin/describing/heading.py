@@ -53,7 +53,7 @@ UNITS_WITH_CAPITALS = {
 _CAPITALS = re.compile(r"(?<=[_\s(\[])(mNm|kNm|Ncm|mN|kN|mA|N)(?=[)\]]?(?:[_\s]\d+)?$)")
 """Unit with capitals at the end of a name, where only the number of a joint may follow it."""
 _AMPERES = re.compile(r"^[iI][_\s](?:(.*)[_\s])?A$")
-"""Current of a motor, such as I_x_A."""
+"""Name of a current, such as I_x_A: the symbol, the joint and the unit."""
 PRECEDENCE = (
     JointQuantity.OTHER,
     JointQuantity.VOLTAGE,
@@ -104,9 +104,9 @@ def split_words(name: str) -> tuple[str, ...]:
     # Spaces about the word: θ1 has the words theta and 1.
     for letter, word in GREEK.items():
         name = name.replace(letter, f" {word} ")
+    name = _AMPERES.sub(r"current \1 amp", name)
     # Before words are parted at capitals, mNm is a word. A capital N at the end is a unit too:
     # shaker_N has the words shaker, newton.
-    name = _AMPERES.sub(r"current \1 amp", name)
     name = _CAPITALS.sub(lambda match: UNITS_WITH_CAPITALS[match[0]], name)
     name = re.sub(r"([a-z])([A-Z])", r"\1 \2", name)
     words: list[str] = re.findall(r"[a-z]+|\d+", name.lower())

@@ -139,8 +139,8 @@ def _by_alias(
                 quantity = JointQuantity.POSITION
                 why += ", taken as the position"
         # More unknown words than known ones: the joint's name stands in it by chance. A part of the
-        # name is enough only where all other words have a meaning. A path says where a signal is
-        # from.
+        # name, or a name in the path before the last slash, is enough only where all other words
+        # have a meaning. Unknown words of the path do not count: they say where a signal is from.
         strange = [word for word in meaning.unknown if word not in path]
         in_path = at + len(alias.words) <= len(path)
         if len(strange) > (0 if alias.is_part or in_path else len(alias.words)):

@@ -165,15 +165,19 @@ def _motions(log: Log) -> dict[str, LogSignal]:
 
 
 def _without_followers(log: Log, motions: Mapping[str, LogSignal]) -> dict[str, LogSignal]:
-    """Leave out joints that follow another one by an equality and that nothing drives."""
+    """Leave out joints that follow another one by an equality and that nothing drives.
 
-    def is_driven(joint: str) -> bool:
-        measured = (JointQuantity.FORCE, JointQuantity.CURRENT, JointQuantity.FORCE_COMMAND)
-        return actuator_on(log.mechanism, joint) is not None or any(
-            log.slots.has(joint, quantity) for quantity in measured
-        )
+    Inverse dynamics of several joints know no equalities: there, a joint without a force has to be
+    asked for.
+    """
 
-    leaders = [joint for joint in motions if is_driven(joint)]
+    def has_force(joint: str) -> bool:
+        forces = (JointQuantity.FORCE, JointQuantity.CURRENT)
+        return any(log.slots.has(joint, quantity) for quantity in forces)
+
+    leaders = [j for j in motions if has_force(j) or actuator_on(log.mechanism, j) is not None]
+    if len(leaders) > 1 and all(has_force(joint) for joint in leaders):
+        return dict(motions)
     followers = {tie.joint for tie in log.mechanism.ties_of(leaders)[0]}
     return {joint: signal for joint, signal in motions.items() if joint not in followers}
 

@@ -112,7 +112,10 @@ class Imitator:
         cosines = np.maximum(along, 0.0) ** 2 / (np.outer(power, size) + 1e-300)
         best, target = np.unravel_index(int(np.argmax(cosines)), cosines.shape)
         share = min(float(along[best, target] / power[best]), LARGEST_SHARE)
-        (start,) = self._fitter.scale_start(candidate, starts[best], share)
+        # Where the effect opposes what is missing, the share is negative, and a scaled start may be
+        # outside the effect's range: an actuator has no delay below 0.
+        (scaled,) = self._fitter.scale_start(candidate, starts[best], share)
+        start = tuple(np.clip(scaled, *self._fitter.bounds((candidate,))).tolist())
         moves = share * absorbed[:, best] - lacking[:, target]
         moved = self._linearised.move(self._retained, moves)
         return Imitation(float(cosines[best, target]), candidate, start, moved)

@@ -36,7 +36,7 @@ from rigtwin.models.joint_simulation import KEPT
 from rigtwin.models.measured_motion import (
     ELASTIC,
     ENDS,
-    is_at_rest,
+    may_be_at_rest,
     recover_motion,
     softest_contact,
 )
@@ -245,13 +245,13 @@ class InverseDynamicsModel(Model[Plant]):
         errors = np.array([self._read[name].error for name in self._movers])
         return float(np.sqrt(np.sum((along * errors) ** 2)))
 
-    def _is_at_rest(self, along: Array, speeds: Array) -> NDArray[np.bool_]:
+    def _may_be_at_rest(self, along: Array, speeds: Array) -> NDArray[np.bool_]:
         """Return the ticks at which the motion along a direction may be at rest."""
         read = [self._read[name] for name in self._movers]
         errors = np.array([each.rate_error for each in read])
         error = float(np.sqrt(np.sum((along * errors) ** 2)))
         moving = [each.resolution for each, share in zip(read, along, strict=True) if share]
-        return is_at_rest(along @ speeds, error, max(moving, default=0.0), self._interval)
+        return may_be_at_rest(along @ speeds, error, max(moving, default=0.0), self._interval)
 
     def _force_of(self, name: str, plant: Plant) -> Array:
         """Return `_share_of` at the plant's own motion, remembered."""
@@ -337,7 +337,7 @@ class InverseDynamicsModel(Model[Plant]):
         unknown[:, :end] = unknown[:, -end:] = True
         for name, onto in self._onto.items():
             if self._machine.components[name].component_type is Guide:
-                unknown |= (onto != 0.0)[:, None] & self._is_at_rest(self._along[name], speeds)
+                unknown |= (onto != 0.0)[:, None] & self._may_be_at_rest(self._along[name], speeds)
         return unknown
 
     def propagated_noise(self, plant: Plant) -> Array | None:

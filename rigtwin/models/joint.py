@@ -18,7 +18,7 @@ from rigtwin.description.machine import Machine
 from rigtwin.description.replay import ReplayOf, Row
 from rigtwin.models.basis import Passage, forms
 from rigtwin.models.joint_simulation import JointSimulation
-from rigtwin.models.measured_motion import ENDS, is_at_rest, recover_motion
+from rigtwin.models.measured_motion import ENDS, may_be_at_rest, recover_motion
 from rigtwin.models.model import Form, Model
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Inputs
@@ -240,7 +240,7 @@ class JointModel(Model[Plant]):
         velocity = self.move(self._configuration.plant)[1]
         ticks = len(velocity)
         smoothed = joint.smoothed
-        rests = is_at_rest(velocity, smoothed.rate_error, smoothed.resolution, joint.interval)
+        rests = may_be_at_rest(velocity, smoothed.rate_error, smoothed.resolution, joint.interval)
         unknown = np.tile(rests, (len(self.rows), 1))
         # A short recording keeps most of its ticks.
         end = min(round(ENDS / joint.interval), ticks // SHORTEST_END)

@@ -13,22 +13,23 @@ from rigtwin.numerics.arrays import Array
 ENDS = 0.3
 """Time at both ends of a recording where the acceleration of a smoothed motion is uncertain, s."""
 AT_REST = 4.0
-"""Velocity in its standard errors up to which a joint may stand."""
+"""Velocity, in its standard errors, up to which a joint may be at rest."""
 SLOWEST = 1e-3
-"""Share of the rms velocity up to which it may stand in any case: a motion without noise is not
-free of errors where it stops."""
+"""Share of the rms velocity up to which a joint may be at rest even if its motion was measured
+without noise: smoothing leaves a small velocity where the motion stops."""
 ELASTIC = 0.3
 """Shortest distance over which friction that reverses builds up, in errors of the measured motion.
 Without it, friction would jump with the noise of the velocity's sign."""
 
 
-def is_at_rest(
+def may_be_at_rest(
     velocity: Array, error: float, resolution: float, period: float
 ) -> NDArray[np.bool_]:
-    """Return the ticks at which a joint may stand, as far as its measured motion can tell.
+    """Return the ticks at or near which a joint may be at rest, as its measured motion shows it.
 
-    Dry friction then has any value within its limits, and no force follows from the motion. Nor
-    does the force follow as long as smoothing spreads the sudden begin and end of a rest.
+    At rest, dry friction may have any value within its limits, so that the motion does not
+    determine the force. Nor does it shortly before and after a rest: smoothing spreads the sudden
+    changes of the velocity in time.
 
     Parameters
     ----------

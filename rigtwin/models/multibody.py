@@ -264,8 +264,8 @@ class Multibody:
 def _tendons_act(model: mujoco.MjModel) -> bool:
     """Return whether a tendon has a spring, damping or inertia that no component describes.
 
-    MuJoCo computes tendons only in the whole stage of positions, which also looks for contacts and
-    takes three times as long as the parts that inertia and bias need.
+    `find_terms` then needs MuJoCo's complete position stage, which also looks for contacts and
+    takes about three times as long as the parts that inertia and bias need.
     """
     coefficients = (
         model.tendon_stiffness,

@@ -38,6 +38,7 @@ def imitate(response: Array) -> tuple[Any, Any]:
         evidence=SimpleNamespace(residual=residual),
         responses_beside=lambda candidate, fit: [((1.0,), response)],
         scale_start=lambda candidate, start, share: ((share * start[0],),),
+        bounds=lambda effects: (np.array([-1.5]), np.array([np.inf])),
     )
     linearised: Any = SimpleNamespace(
         columns_of=lambda effects: -first[:, None],
@@ -61,6 +62,8 @@ def test_what_the_kept_effect_takes_up_does_not_count_against_the_candidate():
 def test_an_opposed_response_imitates_nothing():
     _, imitation = imitate(-np.cos(3.0 * np.arange(SIZE)))
     assert imitation.cosine == 0.0
+    # A start of −2 would be below the effect's range.
+    assert imitation.start == (-1.5,)
 
 
 def test_the_kept_effect_stays_where_moving_it_fits_worse():
