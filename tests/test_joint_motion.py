@@ -282,3 +282,10 @@ def test_a_joint_stands_where_its_velocity_is_within_its_error() -> None:
     distance = np.minimum(np.abs(time - 1.25), np.abs(time - 2.25))
     assert np.mean(stands[distance < 0.1]) > 0.9
     assert not stands[moving & (distance > 0.1 + 3.0 * resolution)].any()
+
+
+def test_a_joint_that_never_moves_is_judged_throughout() -> None:
+    noise = 1e-5 * np.random.default_rng(3).standard_normal(4000)
+    found, _, rate_error, resolution = smooth(0.2 + noise, PERIOD)
+    rate = np.gradient(found, PERIOD)
+    assert not may_be_at_rest(rate, rate_error, resolution, PERIOD).any()

@@ -29,7 +29,8 @@ def may_be_at_rest(
 
     At rest, dry friction may have any value within its limits, so that the motion does not
     determine the force. Nor does it shortly before and after a rest: smoothing spreads the sudden
-    changes of the velocity in time.
+    changes of the velocity in time. A joint that never moves has no such ticks, as its rest is all
+    that the recording shows.
 
     Parameters
     ----------
@@ -44,8 +45,10 @@ def may_be_at_rest(
     """
     from scipy.ndimage import binary_dilation  # Imported late: scipy is slow to load.
 
-    least = SLOWEST * float(np.sqrt(np.mean(velocity**2)))
-    stands = np.abs(velocity) <= max(AT_REST * error, least)
+    typical = float(np.sqrt(np.mean(velocity**2)))
+    if typical <= AT_REST * error:
+        return np.zeros(len(velocity), np.bool_)
+    stands = np.abs(velocity) <= max(AT_REST * error, SLOWEST * typical)
     reach = round(resolution / period)
     return np.asarray(binary_dilation(stands, np.ones(2 * reach + 1)), np.bool_)
 
