@@ -240,7 +240,9 @@ class JointModel(Model[Plant]):
         velocity = self.move(self._configuration.plant)[1]
         ticks = len(velocity)
         smoothed = joint.smoothed
-        rests = may_be_at_rest(velocity, smoothed.rate_error, smoothed.resolution, joint.interval)
+        # Smoothing spoils the inertial force alone.
+        spread = smoothed.resolution if math.isfinite(self.band) else 0.0
+        rests = may_be_at_rest(velocity, smoothed.rate_error, spread, joint.interval)
         unknown = np.tile(rests, (len(self.rows), 1))
         # A short recording keeps most of its ticks.
         end = min(round(ENDS / joint.interval), ticks // SHORTEST_END)

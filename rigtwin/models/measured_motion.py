@@ -28,8 +28,8 @@ def may_be_at_rest(
     """Return the ticks at or near which a joint may be at rest, as its measured motion shows it.
 
     At rest, dry friction may have any value within its limits, so that the motion does not
-    determine the force. Nor does it shortly before and after a rest: smoothing spreads the sudden
-    changes of the velocity in time. A joint that never moves has no such ticks, as its rest is all
+    determine the force. Nor does it shortly before and after a rest: smoothing spreads the jumps
+    of the acceleration in time. A joint that never moves has no such ticks, as its rest is all
     that the recording shows.
 
     Parameters
@@ -39,7 +39,8 @@ def may_be_at_rest(
     error
         Standard error of the velocity, m/s.
     resolution
-        Time over which smoothing spreads a sudden change, s.
+        Time over which smoothing spreads a jump of the acceleration, s. 0 where inertia has no
+        part in the force.
     period
         Time from tick to tick, s.
     """
