@@ -34,6 +34,8 @@ class Starts:
     quadrature : bool
         Whether starts come in pairs a quarter of a wave apart, (amplitude, pitch, 0) and
         (amplitude, pitch, π/2). A linear combination of both gives any phase.
+    shapes : int
+        Number of pitches among which those of a wave were chosen; 0 for no wave.
     is_linear : bool
         Whether the response to the sum of all starts is the sum of their responses.
     bounds : tuple of pairs or None
@@ -44,6 +46,7 @@ class Starts:
     steps: tuple[float, ...]
     quadrature: bool = False
     is_linear: bool = False
+    shapes: int = 0
     bounds: tuple[tuple[float, float], ...] | None = None
 
     @classmethod

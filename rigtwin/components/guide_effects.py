@@ -29,8 +29,11 @@ SHORTEST = 1e-9
 """Shortest half range of a curve, m."""
 NEARLY = 0.1
 """Share of the half range by which the middle of a range that counts as symmetric may be off."""
-WAVES = 3.0
-"""Smallest number of cogging waves along the stroke. Fewer are a force that depends on position."""
+WAVES, MOST_WAVES = 3.0, 512.0
+"""Bounds of the number of cogging waves along the stroke. Fewer than the smallest are a force that
+depends on position, more than the largest are not looked for."""
+SPREAD_WAVES = 40.0
+"""Number of waves up to which pitches are tried whatever the data show."""
 
 
 def _rig_friction(context: Context) -> tuple[float, float]:
@@ -68,10 +71,11 @@ def _waves(
     pitches: Sequence[float],
     steps: tuple[float, float, float],
     bounds: tuple[tuple[float, float], ...] | None = None,
+    shapes: int = 0,
 ) -> Starts:
     # Sine and cosine of each wavelength: a linear combination gives any phase.
     starts = tuple((size, pitch, phase) for pitch in pitches for phase in (0.0, 0.5 * math.pi))
-    return Starts(starts, steps, quadrature=True, bounds=bounds)
+    return Starts(starts, steps, quadrature=True, shapes=shapes or len(pitches), bounds=bounds)
 
 
 def _stribeck(context: Context) -> Starts:
@@ -94,10 +98,13 @@ def _slack(context: Context) -> Starts:
 
 def _cogging(context: Context) -> Starts:
     force, stroke = context.scales.force, context.scales.stroke
-    # Wavelengths that fit the stroke three to forty times.
-    pitches = 2.0 * stroke / np.geomspace(WAVES, 40.0, 24)
-    bounds = ((0.0, 1e7), (0.02 * stroke, 2.0 * stroke / WAVES), (-6.3, 6.3))
-    return _waves(0.03 * force, pitches.tolist(), (0.003 * force, 0.002 * stroke, 0.05), bounds)
+    spread = 2.0 * stroke / np.geomspace(WAVES, SPREAD_WAVES, 24)
+    pitches = (*spread.tolist(), *context.scales.pitches)
+    # The step changes the number of the shortest waves along the stroke by a twentieth.
+    step = min(0.002 * stroke, 0.05 * min(pitches) ** 2 / (2.0 * stroke))
+    bounds = ((0.0, 1e7), (2.0 * stroke / MOST_WAVES, 2.0 * stroke / WAVES), (-6.3, 6.3))
+    shapes = round(MOST_WAVES) if context.scales.pitches else 0
+    return _waves(0.03 * force, pitches, (0.003 * force, step, 0.05), bounds, shapes)
 
 
 def _curve(context: Context) -> Starts:

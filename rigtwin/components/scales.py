@@ -60,6 +60,8 @@ class Scales:
         Highest speed, m/s.
     period : float
         Time from tick to tick, s.
+    pitches : tuple of float
+        Pitches at which the unexplained force repeats along the stroke, m.
     """
 
     stroke: float
@@ -69,6 +71,7 @@ class Scales:
     acceleration: float
     force: float
     period: float
+    pitches: tuple[float, ...] = ()
 
     @property
     def time(self) -> float:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from rigtwin.components import Effect, Scales, Starts
@@ -11,10 +13,13 @@ from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.fit import Values
 from rigtwin.diagnosis.spikes import JUMPS
 from rigtwin.diagnosis.swing import swings
+from rigtwin.diagnosis.waves import repeating_pitches
 from rigtwin.numerics.arrays import Array
 
 LIMITS = ("saturation", "rate_limit", "resonance", "force_limit", "end_stops")
 """Kinds whose response does not scale with their magnitude."""
+PITCHES = 3
+"""Number of pitches that are read off the unexplained force."""
 SMALL_START_BESIDE = 0.2
 """Share of the smallest start at which an effect is simulated as well beside other effects."""
 
@@ -75,7 +80,8 @@ class EffectStarts:
             # middle a typical one.
             values.sort(key=lambda start: abs(start[0] - nominal))
             few.append(values[len(values) // 2])
-            if effect.kind.name not in LIMITS and not starts.is_linear:
+            is_linear = starts.is_linear or starts.quadrature
+            if effect.kind.name not in LIMITS and not is_linear:
                 small = nominal + SMALL_START_BESIDE * (values[0][0] - nominal)
                 few.append((small, *values[0][1:]))
         return few
@@ -124,8 +130,29 @@ class EffectStarts:
             motion = self._evidence.models[longest].motion(component, self._evidence.plant)
             period = self._evidence.lines[longest].period
             position = self._measured_position(component)
-            self._scales[component] = Scales.of(motion, force, period, position)
+            scales = Scales.of(motion, force, period, position)
+            pitches = self._pitches(component, longest, motion.position)
+            self._scales[component] = replace(scales, pitches=pitches)
         return self._scales[component]
+
+    def _pitches(self, component: str, recording: int, position: Array) -> tuple[float, ...]:
+        """Return the pitches at which the unexplained force at a component's joint repeats, m.
+
+        Empty where that force was not measured.
+        """
+        described = self._evidence.machine.components
+        joint = described[component].joint if component in described else ""
+        rows = [
+            number
+            for number, row in enumerate(self._evidence.machine.rows)
+            if row.kind == "force" and row.name in described and described[row.name].joint == joint
+        ]
+        if not joint or not rows:
+            return ()
+        lines = self._evidence.lines[recording]
+        predicted = self._evidence.models[recording].predict(self._evidence.plant)
+        force = lines.measured[rows[0]] - predicted[rows[0]]
+        return repeating_pitches(force, position, PITCHES)
 
     def _measured_position(self, component: str) -> Array | None:
         """Return the measured positions along a component in all recordings, if any.

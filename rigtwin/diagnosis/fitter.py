@@ -22,6 +22,7 @@ from rigtwin.diagnosis.evidence import Evidence
 from rigtwin.diagnosis.fit import Fit, Values, is_possible, with_values
 from rigtwin.diagnosis.gauss_newton import minimise
 from rigtwin.diagnosis.space import Space
+from rigtwin.diagnosis.waves import blend_waves
 from rigtwin.numerics.arrays import Array
 
 BOUND_SHARE = 1e-3
@@ -185,25 +186,9 @@ class Fitter:
         )
 
     def _blend(self, effect: Effect, responses: Responses) -> list[tuple[float, tuple[float, ...]]]:
-        """Return the blends of a wave's sine and cosine that explain most, with their misfits.
-
-        Starts of a periodic effect come in pairs of one pitch. The response to the amplitude a at
-        the phase p is a cos(p) times the first plus a sin(p) times the second response of a pair,
-        so that amplitude and phase follow from two linear strengths.
-        """
-        remainder = self.space.subtract_tolerances(self._nominal_residual)
-        blends = []
-        for (start, cosine), (_, sine) in zip(responses[::2], responses[1::2], strict=True):
-            pair = self.space.project_out(np.stack([cosine, sine], axis=1).astype(np.float64))
-            # Project the tolerances out of both sides, or the strengths would contain what a
-            # tolerance explains as well.
-            strengths = np.linalg.lstsq(pair, remainder, rcond=None)[0]
-            gain = float(np.sum((pair @ strengths) ** 2))
-            amplitude = start[0] * float(np.hypot(*strengths))
-            blends.append(
-                (gain, (amplitude, start[1], float(np.arctan2(strengths[1], strengths[0]))))
-            )
-        blends.sort(reverse=True)
+        """Return the blends of a wave's sine and cosine that explain most, with their misfits."""
+        blends = blend_waves(self.space, responses, self._nominal_residual)
+        ranked = sorted(((gain, start) for gain, start, _ in blends), reverse=True)
         return [
             (
                 self.space.misfit(
@@ -211,7 +196,7 @@ class Fitter:
                 ),
                 start,
             )
-            for _, start in blends[:REFINED_STARTS]
+            for _, start in ranked[:REFINED_STARTS]
         ]
 
     def _combine(

@@ -121,8 +121,8 @@ class Prices:
         count = float(len(effect.kind.fitted))
         starts = self._fitter.starts(effect)
         if starts.quadrature:
-            # Each pitch of a wave is a hypothesis of its own, and was tried at two phases.
-            count += math.log2(len(starts.values) / 2)
+            # Each pitch of a wave is a hypothesis of its own.
+            count += math.log2(starts.shapes)
         elif count == 1.0 and effect.kind.name in CONTAINS_SIMPLER:
             count += SIMPLER_PARAMETERS
         price = self._effect_price + count * self._parameter_price + (count - 1.0) * t.shape_price

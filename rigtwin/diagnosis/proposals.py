@@ -25,6 +25,7 @@ from rigtwin.diagnosis.linearised import Linearised
 from rigtwin.diagnosis.space import Space
 from rigtwin.diagnosis.starts import LATE_BY_TIME
 from rigtwin.diagnosis.threads import Threads
+from rigtwin.diagnosis.waves import blend_waves
 from rigtwin.numerics.arrays import Array
 
 IDENTICAL = 0.99999
@@ -94,9 +95,12 @@ def propose_additions(
             (*first.effects, effect), fitter.plant
         ):
             return None
-        starts, responses = zip(*fitter.responses_beside(effect, first), strict=True)
         # An effect that replaces a tolerance must not be judged beside that tolerance.
         reduced = space.without_replaced((effect,))
+        pairs = fitter.responses_beside(effect, first)
+        if fitter.starts(effect).quadrature:
+            pairs = [(start, shape) for _, start, shape in blend_waves(reduced, pairs, residual)]
+        starts, responses = zip(*pairs, strict=True)
         shapes = np.stack(responses, axis=1).astype(np.float64)
         power, along = reduced.strengths(shapes, residual)
         power = np.maximum(power, 1e-300)
