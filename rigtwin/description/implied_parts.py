@@ -39,6 +39,7 @@ FREE_SERVO = [
     "force_limit",
     "rate_limit",
     "deadband",
+    "backlash",
 ]
 """Effects of servos that move coupled joints."""
 

@@ -209,7 +209,7 @@ class Machine:
             # With one actuator the two delays would be the same effect under two names.
             if effect.group == "computer" and len(movers) < 2:
                 continue
-            if effect.name in self.excluded or (effect.of, effect.kind.name) in self.physics.lacks:
+            if effect.name in self.excluded:
                 continue
             if effect.kind.needs and not parameter_of(self.plant, effect.group, effect.kind.needs):
                 continue

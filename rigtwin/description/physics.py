@@ -98,8 +98,6 @@ class Physics(ABC):
         Whether the model fits a recording equally well when time runs backwards.
     lacks_stops : bool
         Whether the model leaves out the stops at the ends of the joints' ranges.
-    lacks : set of pairs
-        Types of component and kinds of effect that the model does not have.
     compounds : bool
         Whether motions of several joints integrate the effects, so that one effect may resemble
         several others together. The search then begins with the regular effects, and ends with
@@ -120,7 +118,6 @@ class Physics(ABC):
     compares_controller: ClassVar[bool] = True
     reversible: ClassVar[bool] = False
     lacks_stops: ClassVar[bool] = False
-    lacks: ClassVar[frozenset[tuple[type, str]]] = frozenset()
     compounds: ClassVar[bool] = False
     has_contacts: ClassVar[bool] = False
     longest_delay: ClassVar[float] = math.inf

@@ -133,18 +133,10 @@ def _fit_jointly(
 
 
 def _require_possible(evidence: Evidence, effects: tuple[Effect, ...]) -> None:
-    """Raise RigtwinError unless there are effects, the model has them, and each has what it acts
-    through."""
+    """Raise RigtwinError unless there are effects, and each has what it acts through."""
     if not effects:
         possible = ", ".join(effect.name for effect in evidence.machine.effects())
         raise RigtwinError(f"no effect to fit; expected some of {possible}")
-    physics = evidence.machine.physics
-    lacking = [effect.name for effect in effects if (effect.of, effect.kind.name) in physics.lacks]
-    if lacking:
-        raise RigtwinError(
-            f"{', '.join(lacking)} is not modelled for {physics.title}; expected effects that "
-            "rigtwin machine check lists"
-        )
     if not is_possible(effects, evidence.plant):
         names = ", ".join(effect.name for effect in effects)
         raise RigtwinError(

@@ -52,6 +52,7 @@ from rigtwin.diagnosis.starts import (
     start_otherwise,
     start_regular_instead,
     start_unfolded,
+    start_with_play,
 )
 from rigtwin.diagnosis.threads import Threads
 from rigtwin.diagnosis.thresholds import Thresholds
@@ -491,7 +492,10 @@ class HypothesisSearch:
     def _vary_best(self) -> None:
         """Look for rivals of the best hypothesis, until it stays the best."""
         best_fit = self.posterior.best.fit
-        self._keep(self._refine(start_unfolded(self.coarse, best_fit, self._searched)))
+        starts = start_unfolded(self.coarse, best_fit, self._searched)
+        # The dry friction of a servo's joint may explain all but a small rest of a play.
+        starts += start_with_play(self.coarse, best_fit, self.effects)
+        self._keep(self._refine(starts))
         # The same hypothesis may win again after another one was the best, so the loop needs a
         # memory to end.
         varied: set[frozenset[Effect]] = set()

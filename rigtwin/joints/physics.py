@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from rigtwin.components import Servo
 from rigtwin.components.plant import Plant, plant_of
 from rigtwin.description.configuration import Configuration, flatten
 from rigtwin.description.machine import Machine
@@ -253,8 +252,6 @@ class FreeJoints(PrescribedJoints):
     title = "a machine of joints that act on each other, some of them free to move"
     reversible = False
     compounds = True
-    # A play adds a joint's motion of its own, for which coupled joints have no equation.
-    lacks = frozenset({(Servo, "backlash")})
     longest_delay = LATE_TO_COMMAND
     least_period = 0.0
 

@@ -21,7 +21,7 @@ from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Machine
 from rigtwin.description.replay import ReplayOf, Row
 from rigtwin.models.bodies import inertia_at
-from rigtwin.models.forward_arrays import GuideContacts, State, allocate
+from rigtwin.models.forward_arrays import GuideContacts, Servos, State, allocate
 from rigtwin.models.forward_motion import advance
 from rigtwin.models.initial_state import InitialState, Seen
 from rigtwin.models.joint_drives import JointDrives, recorded
@@ -209,14 +209,15 @@ class CoupledJoints:
         Its arguments are the initial state, shape (2, coordinates), the first tick, and the tick
         after the last. Shifts and disturbances are those of `move`.
         """
-        multibody, turning = self._bodies_of(plant), self._layout.turning(plant)
-        inputs = self._drives.collect(plant, shifts)
+        drives = self._drives.resolve(plant)
+        multibody, turning = self._bodies_of(plant), drives.turning(plant)
+        inputs = drives.collect(plant, shifts)
         if disturbance is not None:
             inputs = inputs._replace(disturbance=disturbance)
         if guide_disturbance is not None:
             inputs = inputs._replace(guide_disturbance=guide_disturbance)
-        contacts, size = self._drives.contacts(plant, inputs.pushes), multibody.coordinates
-        h = self._period / self._steps
+        contacts, size = drives.contacts(plant, inputs.pushes), multibody.coordinates
+        h = self._period / drives.steps
         # New data take longer than the simulation of a short window. Compiled code knows them by
         # their address only: this name keeps them alive.
         data: mujoco.MjData = multibody.data()
@@ -226,8 +227,8 @@ class CoupledJoints:
         work = allocate(size, self._loose, len(self._layout.guides), len(self._layout.servos))
 
         def move(start: Array, first: int, last: int, _: mujoco.MjData = data) -> Array:
-            prescribed = inputs.prescribed[:, first * self._steps :]
-            state = begin(contacts, start, prescribed, self._layout.held, h)
+            prescribed = inputs.prescribed[:, first * drives.steps :]
+            state = begin(contacts, inputs.servos, start, prescribed, self._layout.held, h)
             advance(
                 bodies=bodies,
                 contacts=contacts,
@@ -237,7 +238,7 @@ class CoupledJoints:
                 inputs=inputs,
                 work=work,
                 h=h,
-                steps=self._steps,
+                steps=drives.steps,
                 first=first,
                 last=last,
                 out=out,
@@ -313,14 +314,19 @@ class CoupledJoints:
 
 
 def begin(
-    contacts: GuideContacts, start: Array, prescribed: Array, held: np.ndarray, h: float
+    contacts: GuideContacts,
+    servos: Servos,
+    start: Array,
+    prescribed: Array,
+    held: np.ndarray,
+    h: float,
 ) -> State:
     """Return the state of the machine before its first step.
 
     Parameters
     ----------
-    contacts
-        Guides of the machine.
+    contacts, servos
+        Guides and servos of the machine.
     start
         Positions and velocities, m and m/s, shape (2, coordinates).
     prescribed
@@ -333,7 +339,8 @@ def begin(
     Returns
     -------
     State
-        State with all friction springs slack and viscous forces settled.
+        State with all friction springs slack, viscous forces settled, and the rotors behind a play
+        midway in it, as fast as their joints.
     """
     place, speed = start[0].copy(), start[1].copy()
     place[held] = prescribed[held, 0]
@@ -351,4 +358,6 @@ def begin(
         viscous=damping * rate,
         inner=position.copy(),
         within=np.zeros(len(position)),
+        rotor=servos.levers @ place + servos.zero,
+        spin=servos.levers @ speed,
     )

@@ -36,12 +36,15 @@ class State(NamedTuple):
     viscous: Array  # Relaxing viscous force of each guide, N, shape (guides,).
     inner: Array  # Position of each guide behind its compliant mount, m, shape (guides,).
     within: Array  # Velocity of each guide behind its compliant mount, m/s, shape (guides,).
+    rotor: Array  # Position of each servo's rotor behind its play, m, shape (servos,).
+    spin: Array  # Velocity of each servo's rotor behind its play, m/s, shape (servos,).
 
 
 class Servos(NamedTuple):
     """Servos of the machine as compiled code takes them, one row for each servo."""
 
     laws: np.ndarray  # Each `Push`, as records, shape (servos,).
+    plays: np.ndarray  # Each `Play`, as records, shape (servos,).
     levers: Array  # Direction of each servo in the coordinates, shape (servos, coordinates).
     zero: Array  # Position of each servo at zero coordinates, m, shape (servos,).
     inertia: Array  # Inertia that each servo moves, kg, shape (servos,).
@@ -81,6 +84,8 @@ class WorkSpace(NamedTuple):
     # Servos, shape (servos,).
     held_by: Array  # Damping, Ns/m.
     weights: Array  # Implicit share of the damping.
+    turning: Array  # Velocity of the rotor where the joint stands still, m/s.
+    dragged: Array  # Share of the joint's velocity that adds to the rotor's.
     # Guides, shape (guides,).
     place: Array  # Position along each guide, m.
     rate: Array  # Velocity along each guide before the step, m/s.
@@ -122,6 +127,8 @@ def allocate(size: int, loose: int, guides: int, servos: int) -> WorkSpace:
         right=np.zeros(loose),
         held_by=np.zeros(servos),
         weights=np.zeros(servos),
+        turning=np.zeros(servos),
+        dragged=np.zeros(servos),
         place=np.zeros(guides),
         rate=np.zeros(guides),
         guide_force=np.zeros(guides),

@@ -11,6 +11,7 @@ from rigtwin.components.guide_step import GuideStep
 from rigtwin.components.mount import MountState, give_way
 from rigtwin.components.servo import pull, push
 from rigtwin.models.forward_arrays import GuideContacts, Servos, State, StepInputs, WorkSpace
+from rigtwin.models.forward_play import press
 from rigtwin.models.joint_motion import SHORTEST
 from rigtwin.numerics.compiling import part_kernel
 
@@ -40,21 +41,29 @@ def serve(servos: Servos, state: State, number: int, h: float, work: WorkSpace) 
             position_at += servos.levers[a, i] * state.place[i]
             rate_mid += servos.levers[a, i] * work.midspeed[i]
             rate_now += servos.levers[a, i] * state.speed[i]
+        play, at, turning = servos.plays[a], position_at, rate_now
+        if play.half > 0.0:
+            # The servo controls its rotor, which a play separates from the joint.
+            at, rate_mid, turning = state.rotor[a], state.spin[a], state.spin[a]
         earlier = servos.commands[a, max(number - 1, 0)]
         now = 0.5 * (earlier + servos.commands[a, number])
-        force, held_by = pull(law, now, position_at), law.damping_gain
-        if abs(force - held_by * rate_now) > law.limit:
+        force, held_by = pull(law, now, at), law.damping_gain
+        if abs(force - held_by * turning) > law.limit:
             # At its limit a servo damps nothing.
-            force = math.copysign(law.limit, force - held_by * rate_now)
+            force = math.copysign(law.limit, force - held_by * turning)
             held_by = 0.0
+        before = push(law, earlier, at, rate_mid)
         # Midpoint rule, or more implicit where the damping would make that oscillate.
-        weight = 0.5
-        if held_by > 0.0:
-            mass = servos.inertia[a] / h
-            weight = max(0.5, 1.0 - mass / held_by)
+        weight, mass = 0.5, servos.inertia[a]
+        if play.half > 0.0:
+            force, held_by = press(
+                play, mass, a, position_at, rate_now, force, held_by, h, state, work
+            )
+            weight = 1.0
+        elif held_by > 0.0:
+            weight = max(0.5, 1.0 - mass / h / held_by)
         force -= (1.0 - weight) * held_by * rate_now
         work.held_by[a], work.weights[a] = held_by, weight
-        before = push(law, earlier, position_at, rate_mid)
         whole = force - weight * held_by * rate_now
         for i in range(size):
             work.pushed[i] += servos.levers[a, i] * force

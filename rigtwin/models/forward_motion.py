@@ -25,6 +25,7 @@ from rigtwin.models.bodies import Bodies, find_terms
 from rigtwin.models.coupled_friction import rub
 from rigtwin.models.forward_arrays import GuideContacts, Servos, State, StepInputs, WorkSpace
 from rigtwin.models.forward_forces import push_coordinates, resist_explicitly, serve
+from rigtwin.models.forward_play import turn_rotors
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.cholesky import factor, solve
 from rigtwin.numerics.compiling import loop_kernel, part_kernel
@@ -219,6 +220,7 @@ def advance(
             for a in range(loose):
                 work.ahead_speed[free[a]] = work.right[a]
             update_guides(contacts, state, h, work)
+            turn_rotors(inputs.servos, state, h, work)
             if step == 0:
                 for k in range(len(held)):
                     # Inverse dynamics, once per tick, as sensors are read at ticks alone.

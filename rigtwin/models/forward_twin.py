@@ -57,19 +57,25 @@ class ForwardDynamicsTwin(CoupledJoints):
         SteppedTwin
             Twin that advances one tick at a time.
         """
-        h = self._period / self._steps
+        drives = self._drives.resolve(plant)
+        h = self._period / drives.steps
         multibody = self._bodies_of(plant)
-        inputs = self._drives.collect(plant, {})
-        contacts = self._drives.contacts(plant, inputs.pushes)
+        inputs = drives.collect(plant, {})
+        contacts = drives.contacts(plant, inputs.pushes)
         data = multibody.data()
         return SteppedTwin(
-            bodies=multibody.bodies(data, self._layout.turning(plant)),
+            bodies=multibody.bodies(data, drives.turning(plant)),
             owner=data,
             contacts=contacts,
             free=self._layout.free,
             held=self._layout.held,
             state=begin(
-                contacts, self._starts_of(plant)[0], inputs.prescribed, self._layout.held, h
+                contacts,
+                inputs.servos,
+                self._starts_of(plant)[0],
+                inputs.prescribed,
+                self._layout.held,
+                h,
             ),
             inputs=inputs,
             laws=[self._layout.servo_law(plant, name) for name in self._layout.servos],
@@ -79,7 +85,7 @@ class ForwardDynamicsTwin(CoupledJoints):
                 for r in sensors
             ],
             h=h,
-            steps=self._steps,
+            steps=drives.steps,
         )
 
     def simulate_controlled(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 
 import numpy as np
 
@@ -19,12 +20,13 @@ from rigtwin.components.end_stops import soften_stops
 from rigtwin.components.guide import acts
 from rigtwin.components.plant import Plant
 from rigtwin.components.sensors import sensor_of
-from rigtwin.components.servo import Push, pusher_of
+from rigtwin.components.servo import Play, Push, play_of, pusher_of
 from rigtwin.description.machine import Machine
 from rigtwin.models.following import follow_command
 from rigtwin.models.forward_arrays import GuideContacts, Servos, StepInputs
 from rigtwin.models.joint_layout import JointLayout
 from rigtwin.models.joint_motion import RIGID
+from rigtwin.models.joint_simulation import CONTACT_STEPS
 from rigtwin.models.measured_motion import ELASTIC, recover_motion
 from rigtwin.numerics.arrays import Array, interpolate, to_records
 from rigtwin.recording import Inputs
@@ -53,6 +55,11 @@ class JointDrives:
         Smallest inertia that each guide can feel, kg, shape (guides,).
     steps
         Integration steps per tick.
+
+    Attributes
+    ----------
+    steps : int
+        Integration steps per tick.
     """
 
     def __init__(
@@ -65,7 +72,7 @@ class JointDrives:
         steps: int,
     ) -> None:
         self._machine, self._layout, self._signals = machine, layout, signals
-        self._read, self._loosest, self._steps = motions, loosest, steps
+        self._read, self._loosest, self.steps = motions, loosest, steps
         self._period, self._ticks = signals.period, signals.ticks
         # Zeros that nobody writes to serve all predictions.
         self._undisturbed = (
@@ -73,15 +80,26 @@ class JointDrives:
             np.zeros((len(layout.guides), self._ticks)),
         )
 
+    def resolve(self, plant: Plant) -> JointDrives:
+        """Return the drives with steps that are short enough for a plant.
+
+        The impact of two teeth takes a few ms.
+        """
+        if not self._rotors(plant):
+            return self
+        finer = copy(self)
+        finer.steps = CONTACT_STEPS * self.steps
+        return finer
+
     def prescribe(self, plant: Plant, shifts: Mapping[str, Array]) -> Array:
         """Return the prescribed positions at the steps, m, shape (coordinates, steps + 1).
 
         `shifts` maps a sensor to a displacement of its measured motion, m, shape (ticks,).
         """
-        count = self._ticks * self._steps + 1
+        count = self._ticks * self.steps + 1
         positions = np.zeros((self._layout.bodies.coordinates, count))
         time = np.arange(self._ticks + 1) * self._period
-        fine = np.arange(count) * (self._period / self._steps)
+        fine = np.arange(count) * (self._period / self.steps)
         for place, name in zip(self._layout.held, self._layout.leaders, strict=True):
             if name in self._read:
                 signal = self._read[name][0] + shifts.get(name, 0.0)
@@ -89,25 +107,25 @@ class JointDrives:
             else:
                 mover = component_of(plant, name, PositionActuator)
                 late, command = plant.computer.delay, recorded(self._machine, self._signals, name)
-                position = follow_command(mover, command, late, self._period, self._steps)
+                position = follow_command(mover, command, late, self._period, self.steps)
             position = (position - self._layout.zero[name]) / self._layout.along[name][place]
             # The last step needs a position beyond the last tick: extrapolated.
             position = np.append(position, 2.0 * position[-1] - position[-2])
-            positions[place] = position if self._steps == 1 else interpolate(time, position, fine)
+            positions[place] = position if self.steps == 1 else interpolate(time, position, fine)
         return positions
 
     def condition(self, plant: Plant, names: Sequence[str]) -> Array:
         """Return conditioned commands of actuators at the steps, shape (actuators, steps)."""
-        commands = np.zeros((len(names), self._ticks * self._steps))
+        commands = np.zeros((len(names), self._ticks * self.steps))
         for number, name in enumerate(names):
             command = np.ascontiguousarray(recorded(self._machine, self._signals, name))
             mover = pusher_of(plant, name)
-            conditioning = actuator(mover, plant.computer, self._period / self._steps)
+            conditioning = actuator(mover, plant.computer, self._period / self.steps)
             condition_all(
                 conditioning,
                 hold(conditioning, float(command[0])),
                 command,
-                self._steps,
+                self.steps,
                 commands[number],
             )
         return commands
@@ -131,6 +149,7 @@ class JointDrives:
         laws = [self._layout.servo_law(plant, name) for name in names]
         return Servos(
             laws=to_records(Push, laws),
+            plays=to_records(Play, [play_of(pusher_of(plant, name)) for name in names]),
             levers=self._layout.directions(names),
             zero=np.array([self._layout.zero[name] for name in names]),
             inertia=np.array([self.inertia_along(self._layout.along[name]) for name in names]),
@@ -161,15 +180,20 @@ class JointDrives:
         layout = self._layout
         # Rigid dry friction has no spring of its own. A numerical one is as stiff as the step
         # resolves; it keeps the friction single-valued, so that a sticking joint stays put.
-        h = self._period / self._steps
+        h = self._period / self.steps
+        felt = self._loosest.copy()
+        for along, inertia in self._rotors(plant):
+            for number, name in enumerate(layout.guides):
+                if np.array_equal(layout.along[name], along):
+                    felt[number] -= inertia
         guides = [
             soften_stops(component_of(plant, name, Guide), float(mass), h)
-            for name, mass in zip(layout.guides, self._loosest, strict=True)
+            for name, mass in zip(layout.guides, felt, strict=True)
         ]
         dry = [friction(guide) for guide in guides]
         springs = np.empty(len(guides))
         for number, (name, guide) in enumerate(zip(layout.guides, guides, strict=True)):
-            rigid = RIGID * self._loosest[number] / h**2
+            rigid = RIGID * felt[number] / h**2
             # A fully prescribed guide must not see its friction jump with the sensor's noise: its
             # spring builds the friction up over the error of the measured motion.
             if not layout.along[name][layout.free].any():
@@ -192,10 +216,31 @@ class JointDrives:
             rests=np.array(
                 [layout.bodies.rest_of(self._machine.components[name]) for name in layout.guides]
             ),
-            inertia=self._loosest,
+            inertia=felt,
             acts=np.array([acts(guide) for guide in guides], bool),
             rubs=np.array([friction_size(each, 1.0) > 0.0 for each in dry], bool),
         )
+
+    def turning(self, plant: Plant) -> Array:
+        """Return the inertia matrix of the rotors that turn with the joints, kg.
+
+        Its shape is (coordinates, coordinates). A rotor behind a play moves by itself, so that the
+        joint lacks its inertia.
+        """
+        matrix = self._layout.turning(plant)
+        for along, inertia in self._rotors(plant):
+            matrix -= inertia * np.outer(along, along)
+        return matrix
+
+    def _rotors(self, plant: Plant) -> list[tuple[Array, float]]:
+        """Return direction and inertia of each servo's rotor that is behind a play."""
+        directions = [self._layout.along[name] for name in self._layout.servos]
+        plays = [play_of(pusher_of(plant, name)) for name in self._layout.servos]
+        return [
+            (along, play.rotor_share * self.inertia_along(along))
+            for along, play in zip(directions, plays, strict=True)
+            if play.half > 0.0
+        ]
 
     def inertia_along(self, along: Array) -> float:
         """Return the inertia along a direction, kg or kg m², by the guide that has it."""

@@ -85,7 +85,7 @@ def step_joint(
 
 
 @compilable
-def _shrink(speed: float, most: float) -> float:
+def shrink(speed: float, most: float) -> float:
     """Return a speed reduced by dry friction by at most `most`, never beyond zero."""
     return math.copysign(max(abs(speed) - most, 0.0), speed)
 
@@ -131,7 +131,7 @@ def step_behind_play(
     rubbing = h * play.rotor_friction / heavy
     driven = pushed - held_by * rotor[1]
     moved = step_joint(guide_step, carried, state, driven, 0.0, outer)
-    speed, contact = _shrink(freely, rubbing), 0.0
+    speed, contact = shrink(freely, rubbing), 0.0
     distance = rotor[0] + h * speed - moved[0]
     if abs(distance) > play.half:
         side = math.copysign(1.0, distance)
@@ -145,7 +145,7 @@ def step_behind_play(
             beyond = side * distance - play.half
             excess = beyond + relaxed * (beyond - before) - soft * contact
             contact = max(contact + excess / (soft + (1.0 + relaxed) * yielding), 0.0)
-            speed = _shrink(freely - h * side * contact / heavy, rubbing)
+            speed = shrink(freely - h * side * contact / heavy, rubbing)
             moved = step_joint(guide_step, carried, state, driven, 0.0, outer + side * contact)
             distance = rotor[0] + h * speed - moved[0]
     return (rotor[0] + h * speed, speed), moved

@@ -152,7 +152,10 @@ class SteppedTwin:
         for number, law in enumerate(self._laws):
             lever = servos.levers[number]
             at = float(lever @ self._state.place) + float(servos.zero[number])
-            forces += lever * push(law, servos.commands[number, last], at, float(lever @ midspeed))
+            rate = float(lever @ midspeed)
+            if servos.plays[number]["half"] > 0.0:
+                at, rate = self._state.rotor[number], self._state.spin[number]
+            forces += lever * push(law, servos.commands[number, last], at, rate)
         return forces
 
     def step(self, commands: Sequence[float]) -> Array:
