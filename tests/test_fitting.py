@@ -13,8 +13,6 @@ import rigtwin
 from rigtwin.cli import main
 from rigtwin.diagnosis.fitter import Fitter
 from rigtwin.diagnosis.scoring import Scorer
-from tests.test_coupled_servos import ARM, NOMINAL, log
-from tests.test_coupled_servos import HIDDEN as HIDDEN_IN_SERVOS
 
 HIDDEN = {"coulomb@elbow": 0.6, "viscous@elbow": 0.45}
 
@@ -135,11 +133,3 @@ def test_intervals_are_no_narrower_than_the_scatter_over_blocks_of_time():
     deviations = np.sqrt(np.diag(fitted.covariance))
     # The values of both fits differ a little, and so do their responses.
     assert np.all(deviations >= 0.95 * np.concatenate(widths))
-
-
-def test_an_effect_that_the_model_lacks_is_refused(tmp_path: Path):
-    model = tmp_path / "arm.xml"
-    model.write_text(ARM.format(**NOMINAL))
-    written = log(tmp_path / "log.csv", HIDDEN_IN_SERVOS["mass"], 1)
-    with pytest.raises(rigtwin.RigtwinError, match="backlash@m1 is not modelled for"):
-        rigtwin.fit(written, ["backlash@m1"], machine=model)

@@ -37,7 +37,7 @@ from rigtwin.diagnosis.linearised import Linearised
 from rigtwin.diagnosis.merging import start_merged, start_with_summed_delays
 from rigtwin.diagnosis.minima import leave_minimum
 from rigtwin.diagnosis.posterior import HypothesisPosterior
-from rigtwin.diagnosis.prices import RARE
+from rigtwin.diagnosis.prices import is_rare
 from rigtwin.diagnosis.proposals import choose_distinct, propose_additions, propose_replacements
 from rigtwin.diagnosis.regulars import choose_regulars, fit_together, start_balanced
 from rigtwin.diagnosis.rescaling import start_rescaled
@@ -52,7 +52,6 @@ from rigtwin.diagnosis.starts import (
     start_otherwise,
     start_regular_instead,
     start_unfolded,
-    start_with_play,
 )
 from rigtwin.diagnosis.threads import Threads
 from rigtwin.diagnosis.thresholds import Thresholds
@@ -83,9 +82,9 @@ FEW = 3
 """Number of effects up to which a hypothesis is varied before it is extended further."""
 SHORT = 4
 """Number of effects up to which the variants of every leader are fitted."""
-LATER = (*RARE, "deadband", "stribeck")
+LATER = ("deadband", "stribeck")
 """Kinds that are searched only where the others leave a large residual, in machines whose effects
-compound. They refine dry friction, or resemble what it leaves."""
+compound, as are the rare ones. They refine dry friction, or resemble what it leaves."""
 STEADY_ROUNDS = 2
 """Rounds without a better hypothesis after which the search ends."""
 
@@ -133,7 +132,9 @@ class HypothesisSearch:
         self.ended_early = False
         # Where effects compound, every effect costs integrations of all joints.
         staged = self.evidence.machine.physics.compounds
-        self._later = tuple(e for e in self.effects if staged and e.kind.name in LATER)
+        self._later = tuple(
+            e for e in self.effects if staged and (is_rare(e) or e.kind.name in LATER)
+        )
         self._searched = tuple(e for e in self.effects if e not in self._later)
         searched = copy(self.evidence.thin())
         searched.effort = self._effort
@@ -492,10 +493,7 @@ class HypothesisSearch:
     def _vary_best(self) -> None:
         """Look for rivals of the best hypothesis, until it stays the best."""
         best_fit = self.posterior.best.fit
-        starts = start_unfolded(self.coarse, best_fit, self._searched)
-        # The dry friction of a servo's joint may explain all but a small rest of a play.
-        starts += start_with_play(self.coarse, best_fit, self.effects)
-        self._keep(self._refine(starts))
+        self._keep(self._refine(start_unfolded(self.coarse, best_fit, self._searched)))
         # The same hypothesis may win again after another one was the best, so the loop needs a
         # memory to end.
         varied: set[frozenset[Effect]] = set()

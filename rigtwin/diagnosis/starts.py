@@ -12,8 +12,6 @@ from collections.abc import Collection, Sequence
 from itertools import combinations, product
 
 from rigtwin.components import Effect, Guide
-from rigtwin.components.plant import component_of
-from rigtwin.components.servo import Servo
 from rigtwin.diagnosis.fit import Fit, Values, clashes, is_possible, leave_one_out, with_values
 from rigtwin.diagnosis.fitter import Fitter
 from rigtwin.diagnosis.prices import is_rare
@@ -35,9 +33,6 @@ UNFOLDED = {
 }
 """Kinds that two others together resemble. At low frequencies a lag and a delay resemble an effect
 of second order. A spring that hardens resembles stops at its ends."""
-ROTOR_SHARES = (0.5, 0.9)
-"""Shares of the rotor in a joint's inertia from which a play is fitted. Behind a gear of a high
-ratio the rotor is the larger part."""
 COMBINATIONS = 150
 """Largest number of combinations of starts that are simulated for one hypothesis."""
 REFINED = 2
@@ -134,46 +129,6 @@ def start_unfolded(fitter: Fitter, leader: Fit, candidates: Sequence[Effect]) ->
             and not any(clashes(candidate, remaining) for candidate in pair)
         ):
             starts.append(_start_pair(fitter, remaining, values, (pair[0], pair[1])))
-    return starts
-
-
-def start_with_play(fitter: Fitter, leader: Fit, candidates: Sequence[Effect]) -> list[Start]:
-    """Start a play between servo and joint in the place of the dry friction of the joint.
-
-    Both keep the joint by a constant distance behind the command: dry friction F of a servo with
-    the position gain k by F/k, and a play by half its width.
-
-    Parameters
-    ----------
-    fitter
-        Fitter of the evidence.
-    leader
-        Fit whose dry friction is replaced.
-    candidates
-        Candidate effects.
-
-    Returns
-    -------
-    list of pairs
-        Effects, and the values from which they are fitted.
-    """
-    starts: list[Start] = []
-    components = fitter.evidence.machine.components
-    plays = [play for play in candidates if play.kind.name == "backlash" and play.of is Servo]
-    for number, (effect, remaining, values) in enumerate(leave_one_out(leader)):
-        if effect.kind.name != GATEWAY or effect.of is not Guide:
-            continue
-        friction = leader.values[number][0]
-        for play in plays:
-            along = components[play.group].acts_on == components[effect.group].acts_on
-            if along and not clashes(play, remaining) and play not in remaining:
-                servo = component_of(leader.plant, play.group, Servo)
-                width = 2.0 * friction / (servo.gains * servo.position_gain)
-                _, _, *contact = fitter.starts(play).values[0]
-                starts += [
-                    ((*remaining, play), (*values, (width, share, *contact)))
-                    for share in ROTOR_SHARES
-                ]
     return starts
 
 
