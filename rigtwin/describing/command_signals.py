@@ -26,7 +26,7 @@ OPPOSED = -0.5
 """Correlation of a command and a position below which the command's sign is turned."""
 
 
-def position_command(log: Log, joint: str, position: Array) -> LogSignal | None:
+def position_command(log: Log, joint: str, positions: Mapping[str, Array]) -> LogSignal | None:
     """Return the command of a position actuator; None where a question is open.
 
     Parameters
@@ -35,8 +35,8 @@ def position_command(log: Log, joint: str, position: Array) -> LogSignal | None:
         The log. Questions are added to it.
     joint
         Joint that the actuator moves.
-    position
-        Position of the joint, SI, shape (rows,).
+    positions
+        Joint → its position, SI, shape (rows,).
     """
     key = f"{joint}.command"
     if not log.slots.has(joint, JointQuantity.COMMAND):
@@ -48,7 +48,25 @@ def position_command(log: Log, joint: str, position: Array) -> LogSignal | None:
     # The owner has stated all of it: nothing is left to conclude.
     if source is not None and (source.formula or source.unit):
         return log.stated_signal(joint, JointQuantity.COMMAND)
-    return _following_command(log, joint, JointQuantity.COMMAND, position)
+    return _following_command(log, joint, JointQuantity.COMMAND, travel(log, joint, positions))
+
+
+def travel(log: Log, joint: str, positions: Mapping[str, Array]) -> Array:
+    """Return the position of a joint's actuator, SI, shape (rows,): of the joint, or of a tendon.
+
+    Parameters
+    ----------
+    log
+        The log.
+    joint
+        Joint that the actuator moves.
+    positions
+        Joint → its position, SI, shape (rows,).
+    """
+    along = log.mechanism.acts_on("actuator", actuator_on(log.mechanism, joint) or "")
+    if not all(name in positions for name, _ in along):
+        return positions[joint]
+    return np.asarray(sum(ratio * positions[name] for name, ratio in along))
 
 
 def force_command(
@@ -93,7 +111,8 @@ def _following_command(
     # A column that its owner assigned keeps the sign that the owner gave.
     is_stated = log.slots.stated(joint, quantity) is not None
     measured = JointQuantity.POSITION if quantity is JointQuantity.COMMAND else quantity
-    si = SI[measured][log.mechanism.turns(joint)]
+    actuator = actuator_on(log.mechanism, joint) or ""
+    si = SI[measured][log.mechanism.is_angle(log.mechanism.acts_on("actuator", actuator))]
     try:
         column, why, sign = _source(log, joint, quantity)
         general = log.stated.units.get(quantity)

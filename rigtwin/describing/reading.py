@@ -271,7 +271,7 @@ def _movers(
             mover = (
                 force_command(log, joint, {**forces, **still}, position)
                 if test == FORCES
-                else position_command(log, joint, position)
+                else position_command(log, joint, positions)
             )
         if mover is not None:
             movers[joint] = mover

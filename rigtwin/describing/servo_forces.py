@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from rigtwin.describing.command_signals import position_command
+from rigtwin.describing.command_signals import position_command, travel
 from rigtwin.describing.log import STATED, Log
 from rigtwin.describing.quantity import JointQuantity
 from rigtwin.describing.replay_kind import are_servos
@@ -54,13 +54,13 @@ def come_from_servos(
     if any(force.why == STATED for force in forces.values()):
         return False
     errors = [
-        _law_error(log, joint, positions[joint], log.values(force))
+        _law_error(log, joint, positions, log.values(force))
         for joint, force in forces.items()
     ]
     return max(errors) <= ROUGH_ERROR and float(np.median(errors)) <= LAW_ERROR
 
 
-def _law_error(log: Log, joint: str, position: Array, force: Array) -> float:
+def _law_error(log: Log, joint: str, positions: Mapping[str, Array], force: Array) -> float:
     """Return what the law kp · (command − position) − kv · velocity misses of a force.
 
     It is a share of the force's standard deviation beyond noise, and infinite where another
@@ -70,7 +70,7 @@ def _law_error(log: Log, joint: str, position: Array, force: Array) -> float:
     if servo is None or log.clock is None or not log.slots.has(joint, JointQuantity.COMMAND):
         return math.inf
     open_questions = list(log.questions)
-    signal = position_command(log, joint, position)
+    signal, position = position_command(log, joint, positions), travel(log, joint, positions)
     # What is not clear about a command is asked only where a test needs it.
     log.questions[:] = open_questions
     if signal is None:

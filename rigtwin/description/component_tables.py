@@ -149,7 +149,7 @@ class Components:
         )
         # A whole body moves with all joints before it, so it has no single coordinate.
         acts_on = () if kind in WHOLE else mechanism.acts_on(element, mjcf)
-        turns = bool(acts_on) and all(mechanism.turns(hinge) for hinge, _ in acts_on)
+        turns = mechanism.is_angle(acts_on)
         channel, unit = self._find_channel(name, where, kind, table, turns)
         self.by_name[name] = Component(
             name=name,

@@ -23,7 +23,8 @@ def movable_joints(mechanism: Mechanism) -> list[str]:
 def actuator_on(mechanism: Mechanism, joint: str) -> str | None:
     """Return the name of the actuator that acts on a joint; None without a named one.
 
-    A motor that pulls a fixed tendon counts as that of the first joint that the tendon passes.
+    A motor or servo that pulls a fixed tendon counts as that of the first joint that the tendon
+    passes.
     """
     for name in mechanism.names("actuator"):
         if mechanism.joint_of("actuator", name) == joint:
@@ -33,14 +34,15 @@ def actuator_on(mechanism: Mechanism, joint: str) -> str | None:
 
 
 def _tendon_motors(mechanism: Mechanism) -> list[str]:
-    """Return the motors on fixed tendons that pass no joint with another actuator."""
+    """Return the motors and servos on fixed tendons that pass no joint with another actuator."""
     passed = {name: _passed(mechanism, name) for name in mechanism.names("actuator")}
     moved = [joint for joints in passed.values() for joint in joints]
     return [
         name
         for name, joints in passed.items()
         if mechanism.tendon_of("actuator", name) is not None
-        and not mechanism.positions(name)
+        # A servo with a gear has a law of its own.
+        and (not mechanism.positions(name) or mechanism.servo(name) is not None)
         and not mechanism.falls_with_speed(name)
         and joints
         # The force at a joint that several actuators move does not follow from one command.

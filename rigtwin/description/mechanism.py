@@ -79,6 +79,8 @@ class Tie(NamedTuple):
         return Tie(self.to, self.joint, 1.0 / self.ratio, -self.offset / self.ratio, self.number)
 
 
+LARGEST_PULLEY = 0.1
+"""Largest radius of a pulley, m: larger coefficients of a fixed tendon are ratios of angles."""
 MASSLESS = 1e-6
 """Mass of a URDF link without inertia, kg. MuJoCo refuses moving bodies without mass; the square
 of this number is the inertia, kg m²."""
@@ -381,6 +383,14 @@ class Mechanism:
         """Return whether a joint is a hinge."""
         kind = int(self.model.jnt_type[self.number("joint", joint)])
         return kind == mujoco.mjtJoint.mjJNT_HINGE
+
+    def is_angle(self, acts_on: tuple[tuple[str, float], ...]) -> bool:
+        """Return whether a coordinate Σ cᵢ · qᵢ is an angle.
+
+        MJCF does not say so: hinges with small coefficients are taken for pulleys of a cable.
+        """
+        hinges = bool(acts_on) and all(self.turns(joint) for joint, _ in acts_on)
+        return hinges and max(abs(ratio) for _, ratio in acts_on) > LARGEST_PULLEY
 
     def armature(self, element: str, name: str) -> float:
         """Return the armature of a joint or a tendon, kg or kg m²."""
