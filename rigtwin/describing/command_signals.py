@@ -249,7 +249,9 @@ def _as_control(log: Log, signal: LogSignal) -> LogSignal:
         return replace(signal, scale=1.0, assumed=("in the unit of the actuator's control",))
     # The log holds a force, but the recording's channel is the control: force = gear · gain ·
     # control.
-    is_control = constant in (0.0, 1.0) or signal.unit == "1" or signal.formula
+    # A current or a voltage is the control of the actuator itself.
+    is_force = is_unit(signal.unit) and unit_of(signal.unit)[0] in SI[JointQuantity.FORCE]
+    is_control = constant in (0.0, 1.0) or not is_force or signal.formula
     if is_control or not takes_force(log.mechanism, signal.joint):
         return signal
     return replace(
