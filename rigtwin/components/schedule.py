@@ -1,13 +1,15 @@
 """Schedule: forces of a guide that follow a recorded channel, such as a voltage or a temperature.
 
-With the channel's value u behind a first-order lag, position x and velocity v of the joint:
+With the channel's value behind a first-order lag, c, position x and velocity v of the joint:
 
-    F = coulomb·u·s + viscous·u·v + offset·u,
+    F = coulomb·u·s + viscous·u·v + offset·u,    u = a + (exp(growth·(c − a)) − 1)/growth,
 
-where s, from −1 to 1, is dry friction of unit size: the direction of motion, after a reversal only
-once the joint has moved by the error of its measured position. Friction that builds up over a speed
-v_r, the `rounding`, has s = tanh(v/v_r). The dampers of controllable fluids are of this kind
-[Spencer, Dyke, Sain and Carlson, J. Eng. Mech. 123(3), 1997].
+with the middle a of the channel, `growth_about`; without growth u = c. Dry friction of unit size, s
+from −1 to 1, has the direction of motion, after a reversal only once the joint has moved by the
+error of its measured position. Friction that builds up over a speed v_r, the `rounding`, has
+s = tanh(v/v_r). The dampers of controllable fluids are of this kind [Spencer, Dyke, Sain and
+Carlson, J. Eng. Mech. 123(3), 1997]. The viscosity of oil falls exponentially with its temperature
+[Reynolds, Phil. Trans. R. Soc. 177 (1886) 157].
 """
 
 from __future__ import annotations
@@ -19,13 +21,15 @@ import numpy as np
 from rigtwin.components.dry_friction import slide
 from rigtwin.components.effect import Context, Guess, Kind, Starts
 from rigtwin.components.quantity import NONE, Quantity
-from rigtwin.components.scales import Scales
+from rigtwin.components.scales import SHARES, Scales
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.compiling import kernel
 from rigtwin.numerics.filters import low_pass
 
-SHARES = (0.02, 0.1, 0.4, -0.1)
+PARTS = (0.02, 0.1, 0.4, -0.1)
 """Shares of the motion's force at which a search starts, at the channel's largest value."""
+LARGEST_EXPONENT = 50.0
+"""Largest exponent of a force that grows with its channel, which keeps it finite."""
 
 
 class Schedule(NamedTuple):
@@ -37,23 +41,35 @@ class Schedule(NamedTuple):
     coulomb: Annotated[float, Quantity("N per unit of the channel", -1e9, 1e9, NONE)] = 0.0
     viscous: Annotated[float, Quantity("Ns/m per unit of the channel", -1e9, 1e9, NONE)] = 0.0
     offset: Annotated[float, Quantity("N per unit of the channel", -1e9, 1e9, NONE)] = 0.0
+    growth: Annotated[float, Quantity("1 per unit of the channel", -1e9, 1e9, NONE)] = 0.0
+    growth_about: Annotated[float, Quantity("unit of the channel", -1e12, 1e12, NONE)] = 0.0
     lag: Annotated[float, Quantity("s", 0.0, 10.0, NONE)] = 0.0
     rounding: Annotated[float, Quantity("m/s", 0.0, 1e3, NONE)] = 0.0
 
 
 def follow(schedule: Schedule, level: Array, period: float) -> Array:
-    """Return the channel's value behind its lag, shape (ticks,).
+    """Return the channel behind its lag and growth, to which forces are proportional.
 
     Parameters
     ----------
     schedule
-        Schedule with the lag.
+        Schedule with lag and growth.
     level
         Recorded values of the channel, shape (ticks,).
     period
         Time from tick to tick, s.
+
+    Returns
+    -------
+    array
+        Values in the channel's unit, shape (ticks,).
     """
-    return low_pass(level, schedule.lag, period) if schedule.lag > 0.0 else level
+    late = low_pass(level, schedule.lag, period) if schedule.lag > 0.0 else level
+    if schedule.growth == 0.0:
+        return late
+    middle = schedule.growth_about
+    exponents = np.clip(schedule.growth * (late - middle), -LARGEST_EXPONENT, LARGEST_EXPONENT)
+    return middle + np.expm1(exponents) / schedule.growth
 
 
 def scheduled_force(schedule: Schedule, level: Array, motion: Array, spring: float) -> Array:
@@ -64,7 +80,7 @@ def scheduled_force(schedule: Schedule, level: Array, motion: Array, spring: flo
     schedule
         Change of the guide's forces per unit of the channel.
     level
-        Values of the channel behind its lag, shape (ticks,).
+        Channel behind its lag and growth, shape (ticks,), as `follow` returns it.
     motion
         Position, velocity and acceleration of the joint, shape (3, ticks).
     spring
@@ -107,9 +123,17 @@ def _per_channel(size: str) -> Guess:
         scales: Scales = context.scales
         force = scales.force / (scales.speed if size == "damping" else 1.0)
         unit = force / max(context.swing.largest[0], 1e-300)
-        return Starts.single([share * unit for share in SHARES], 0.005 * unit)
+        return Starts.single([share * unit for share in PARTS], 0.005 * unit)
 
     return guess
+
+
+def _growth(context: Context) -> Starts:
+    # About the middle of the channel, growth resembles the proportional force least.
+    largest, middle = context.swing.largest[0], context.swing.largest[SHARES.index(0.5)]
+    unit = 1.0 / max(largest, 1e-300)
+    values = tuple((share * unit, middle) for share in (-2.0, -0.5, 0.5, 2.0))
+    return Starts(values, (0.01 * unit, 0.0))
 
 
 def _lag(context: Context) -> Starts:
@@ -146,6 +170,15 @@ KINDS = (
         ("offset",),
         "a force that grows with the recorded channel, whichever way the joint moves",
         {Schedule: _per_channel("force")},
+    ),
+    Kind(
+        "growth",
+        "exponential growth of its force",
+        ("growth", "growth_about"),
+        "the force grows exponentially with the recorded channel, and not in proportion",
+        {Schedule: _growth},
+        "the force fades exponentially as the recorded channel grows",
+        constants=("growth_about",),
     ),
     Kind(
         "lag",

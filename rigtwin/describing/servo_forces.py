@@ -54,8 +54,7 @@ def come_from_servos(
     if any(force.why == STATED for force in forces.values()):
         return False
     errors = [
-        _law_error(log, joint, positions, log.values(force))
-        for joint, force in forces.items()
+        _law_error(log, joint, positions, log.values(force)) for joint, force in forces.items()
     ]
     return max(errors) <= ROUGH_ERROR and float(np.median(errors)) <= LAW_ERROR
 

@@ -52,6 +52,7 @@ from rigtwin.diagnosis.starts import (
     start_otherwise,
     start_regular_instead,
     start_unfolded,
+    start_with_base,
 )
 from rigtwin.diagnosis.threads import Threads
 from rigtwin.diagnosis.thresholds import Thresholds
@@ -164,6 +165,9 @@ class HypothesisSearch:
             All scored hypotheses with their weights.
         """
         singles = self._fit_singles()
+        self._keep(
+            self._refine(start_with_base(self.coarse, self.coarse.nominal_fit, self._searched))
+        )
         if self._has_gap(singles):
             # Where effects compound, the gain of one servo may resemble the friction of all joints,
             # so the regular effects are fitted together before a climb begins with such a gain.
@@ -429,6 +433,7 @@ class HypothesisSearch:
             fits += self._refine(
                 [
                     *start_in_series(self.coarse, leader, self._searched, self.pool.keys()),
+                    *start_with_base(self.coarse, leader, self._searched),
                     *start_unfolded(self.coarse, leader, self._searched),
                 ]
             )

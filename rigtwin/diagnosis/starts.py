@@ -11,7 +11,7 @@ import math
 from collections.abc import Collection, Sequence
 from itertools import combinations, product
 
-from rigtwin.components import Effect, Guide
+from rigtwin.components import Effect, Guide, Schedule
 from rigtwin.diagnosis.fit import Fit, Values, clashes, is_possible, leave_one_out, with_values
 from rigtwin.diagnosis.fitter import Fitter
 from rigtwin.diagnosis.prices import is_rare
@@ -93,6 +93,43 @@ def start_in_series(
                 values = tuple(values for _, values in fitted)
                 starts.append(_start_pair(fitter, remaining, values, pair))
     return starts
+
+
+def start_with_base(fitter: Fitter, leader: Fit, candidates: Sequence[Effect]) -> list[Start]:
+    """Start a force that follows a channel together with the part of it that does not.
+
+    A channel such as a temperature is far from zero throughout. In proportion to it alone, a force
+    resembles one that follows nothing.
+
+    Parameters
+    ----------
+    fitter
+        Fitter of the evidence.
+    leader
+        Fit to which the pair is added.
+    candidates
+        Candidate effects.
+
+    Returns
+    -------
+    list of pairs
+        Effects, and the best combination of the pair's starts.
+    """
+    components = fitter.evidence.machine.components
+    following = [effect for effect in candidates if effect.of is Schedule]
+    pairs = [
+        (base, follower)
+        for follower in following
+        for base in candidates
+        if base.of is Guide
+        and base.kind.name == follower.kind.name
+        and components[base.group].acts_on == components[follower.group].acts_on
+    ]
+    return [
+        _start_pair(fitter, leader.effects, leader.values, pair)
+        for pair in pairs
+        if not any(effect in leader.effects or clashes(effect, leader.effects) for effect in pair)
+    ]
 
 
 def start_unfolded(fitter: Fitter, leader: Fit, candidates: Sequence[Effect]) -> list[Start]:
