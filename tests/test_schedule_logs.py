@@ -65,6 +65,25 @@ def test_friction_that_follows_a_temperature_is_named_with_its_slope(tmp_path: P
     assert at_zero.value == pytest.approx(60.0 + 1.5 * 20.0, rel=0.03)
 
 
+@pytest.mark.slow
+def test_friction_that_fades_exponentially_with_a_temperature_is_named(tmp_path: Path) -> None:
+    """Friction 60·exp(−(T − 20)/12) Ns/m, that of an oil."""
+    model, logs = write_piston(tmp_path), []
+    for name, fastest in (("fit.csv", 1.0), ("held.csv", 1.3)):
+        columns = moved(0.0)
+        speed, warm = np.gradient(columns["position"], PERIOD), columns["temperature"] - 20.0
+        columns["temperature"] = 20.0 + fastest * warm
+        fading = 60.0 * (np.exp(-fastest * warm / 12.0) - 1.0)
+        logs.append(
+            write_log(tmp_path / name, {**columns, "force": columns["force"] + fading * speed})
+        )
+    answer = rigtwin.diagnose(logs[0], machine=model, held_out=logs[1])
+    effects = {str(finding.name): finding.parameters for finding in answer.effects}
+    assert set(effects) == {"viscous@piston", "viscous@temperature", "growth@temperature"}
+    assert effects["growth@temperature"]["growth"].value == pytest.approx(-1.0 / 12.0, rel=0.05)
+    assert answer.verdict == "explained"
+
+
 @pytest.mark.parametrize(
     ("column", "actuators", "joint"),
     [

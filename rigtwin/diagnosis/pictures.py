@@ -31,6 +31,7 @@ PICTURES: dict[str, str] = {
     "viscous_asymmetry": "velocity",
     "load_friction": "velocity",
     "rounding": "velocity",
+    "growth": "velocity",
     "drag": "velocity",
     "damping": "velocity",
     "damping_gain": "velocity",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from rigtwin.components.schedule import Schedule, follow, scheduled_force
 from tests.laws.written import law_of
@@ -42,3 +43,12 @@ def test_rounded_friction_is_a_hyperbolic_tangent_of_the_speed():
     """F = 20 u tanh(v / 0.03)."""
     force = scheduled_force(Schedule(coulomb=20.0, rounding=0.03), VOLTAGE, MOTION, 1e9)
     np.testing.assert_allclose(force, 20.0 * VOLTAGE * np.tanh(SPEED / 0.03), atol=1e-9)
+
+
+@law_of("growth", Schedule)
+@pytest.mark.parametrize("growth", [-0.045, 1e-9, 0.02])
+def test_a_force_that_grows_with_its_channel_is_exponential_about_the_middle(growth: float):
+    """u = 40 + (exp(g (c − 40)) − 1) / g, whose slope about the middle is 1."""
+    warm = np.linspace(20.0, 60.0, len(TIME))
+    grown = follow(Schedule(growth=growth, growth_about=40.0), warm, PERIOD)
+    np.testing.assert_allclose(grown, 40.0 + (np.exp(growth * (warm - 40.0)) - 1.0) / growth, 1e-4)
