@@ -35,8 +35,6 @@ MOTIONS = (JointQuantity.POSITION, JointQuantity.VELOCITY)
 """Quantities that are no force."""
 COMMANDS = (*MOVING, JointQuantity.VELOCITY_COMMAND, JointQuantity.VOLTAGE)
 """Quantities of a command or a force, at least one of which says what moves a joint."""
-SUGGESTED = 3
-"""Columns of one joint that a question offers."""
 
 
 def force_signals(
@@ -125,7 +123,7 @@ def _motor_current(log: Log, joint: str, positions: Mapping[str, Array]) -> LogS
     if not takes_force(log.mechanism, joint) or log.slots.has(joint, JointQuantity.COMMAND):
         return None
     constant = actuator_constant(log.mechanism, actuator)
-    slope = _slope(log, joint, positions, log.columns.values[columns[0]])
+    slope = slope_of(log, joint, positions, log.columns.values[columns[0]])
     if constant in (0.0, 1.0):
         return None
     unit = log.columns.units.get(columns[0], "") or "A"
@@ -205,66 +203,11 @@ def offer_remaining_command(log: Log, positions: Mapping[str, Array]) -> None:
     joint, unnamed = joints[0], [name for name, why in log.unused.items() if why == UNNAMED]
     if len(unnamed) != 1 or any(log.slots.has(joint, quantity) for quantity in COMMANDS):
         return
-    slope = _slope(log, joint, positions, log.columns.values[unnamed[0]])
+    slope = slope_of(log, joint, positions, log.columns.values[unnamed[0]])
     ratio = slope.slope * actuator_constant(log.mechanism, actuator) if slope else 0.0
     if slope is not None and slope.explained > SHOWN and SLOPE_LOW < ratio < SLOPE_HIGH:
         log.slots.offer(Match(unnamed[0], joint, JointQuantity.COMMAND, REMAINING, 0.5))
         del log.unused[unnamed[0]]
-
-
-def suggest_forces(
-    log: Log, joints: Sequence[str], positions: Mapping[str, Array], forces: Mapping[str, LogSignal]
-) -> None:
-    """Ask whether currents, or columns without a meaning, are the forces that are missing.
-
-    Parameters
-    ----------
-    log
-        The log. Questions are added to it.
-    joints
-        Joints that take part.
-    positions
-        Joint → position, SI, shape (rows,).
-    forces
-        Forces that are known.
-    """
-    # Nothing pushes a joint without an actuator, unless the model, as a URDF, has none at all.
-    lacking = [
-        joint
-        for joint in joints
-        if joint not in forces
-        and (actuator_on(log.mechanism, joint) or not log.mechanism.model.nactuator)
-    ]
-    currents = {joint: log.slots.columns(joint, JointQuantity.CURRENT) for joint in lacking}
-    offers = {joint: names for joint, names in currents.items() if names}
-    # With one joint, any column without a meaning could be its force; with several, the offers
-    # would be too many to judge.
-    if len(joints) == 1 and lacking and not offers:
-        offers = {joints[0]: [name for name, why in log.unused.items() if why == UNNAMED]}
-    unclear: list[tuple[str, str]] = []
-    for joint, names in offers.items():
-        for name in names[:SUGGESTED]:
-            slope = _slope(log, joint, positions, log.columns.values[name])
-            # The slope is the number of units per newton, so its inverse converts the column.
-            if slope is not None and slope.explained > SHOWN:
-                factor = f"{1.0 / slope.slope:.4g}"
-                unit = SI[JointQuantity.FORCE][log.mechanism.turns(joint)]
-                log.questions.append(
-                    f"column {name!r} explains {100.0 * slope.explained:.0f} % of the force that "
-                    f"the model needs at {joint}, with {factor} {unit} a unit: is it that force? "
-                    f"then say {option(f'{joint}.force', f'{factor} * {name}')}, with the factor "
-                    "that you know"
-                )
-            elif currents[joint]:
-                unclear.append((joint, name))
-    if unclear:
-        joint, name = unclear[0]
-        names = enumerate_names([column for _, column in unclear])
-        log.questions.append(
-            f"{names} are currents; what force at the joint does one ampere make, behind the gear? "
-            f"say {option(f'{joint}.force', f'FACTOR * {name}')}"
-            + (", and the same of the others" if len(unclear) > 1 else "")
-        )
 
 
 def _are_magnitudes(
@@ -276,13 +219,30 @@ def _are_magnitudes(
     values = {joint: log.values(signal) for joint, signal in forces.items()}
     if not values or not all(is_magnitude(v, positions[j]) for j, v in values.items()):
         return False
-    slopes = [_slope(log, joint, positions, each) for joint, each in values.items()]
+    slopes = [slope_of(log, joint, positions, each) for joint, each in values.items()]
     # Inverse dynamics that explain a force show its sign, whatever its minimum is.
     return all(slope is None or slope.explained < SHOWN for slope in slopes)
 
 
-def _slope(log: Log, joint: str, positions: Mapping[str, Array], force: Array) -> Slope | None:
-    """Regression of a column on the force that the model needs; None where time is unknown."""
+def slope_of(log: Log, joint: str, positions: Mapping[str, Array], force: Array) -> Slope | None:
+    """Return the regression of a column on the force that the model needs.
+
+    Parameters
+    ----------
+    log
+        The log.
+    joint
+        Joint at which the force acts.
+    positions
+        Joint → position, SI, shape (rows,).
+    force
+        Column in any unit, shape (rows,).
+
+    Returns
+    -------
+    Slope or None
+        None where time is unknown.
+    """
     if log.clock is None or not np.isfinite(force).all() or len(force) != len(positions[joint]):
         return None
     return force_slopes(log.mechanism, log.time(), positions, {joint: force}).get(joint)

@@ -20,8 +20,8 @@ from rigtwin.describing.force_signals import (
     check_forces,
     force_signals,
     offer_remaining_command,
-    suggest_forces,
 )
+from rigtwin.describing.force_suggestions import suggest_forces
 from rigtwin.describing.formulas import read_formula
 from rigtwin.describing.log import Log
 from rigtwin.describing.match import Match
