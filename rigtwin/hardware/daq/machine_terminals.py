@@ -56,16 +56,23 @@ class MachineTerminals:
         self._written = np.zeros(len(outputs))
         self._values, self.volts = np.zeros(len(rows)), np.zeros(len(rows))
         self._sample()
+        # A step of a second twin compiles what a tick needs, so that the first tick is in time.
+        self._receive(self._written)
+        begin_live(machine, configuration, outputs, rows).step(self._written.tolist())
 
     def advance(self, written: Array, power: bool) -> None:
         """Advance by one period under held output voltages, shape (outputs,), and sample."""
         # Without power the brakes hold the machine: its state does not advance.
         if power:
-            # The actuators receive what the card's 16-bit converter makes of a voltage.
-            to_bits(self._outputs, written, self._written)
-            to_values(self._outputs, self._written, self._written)
+            self._receive(written)
             self._stepped.step(self._written.tolist())
         self._sample()
+
+    def _receive(self, written: Array) -> None:
+        """Convert output voltages, shape (outputs,), to the actuators' commands."""
+        # The actuators receive what the card's 16-bit converter makes of a voltage.
+        to_bits(self._outputs, written, self._written)
+        to_values(self._outputs, self._written, self._written)
 
     def _sample(self) -> None:
         """Sample the sensors: noise and hum, transducer, quantisation, conversion to volts."""
