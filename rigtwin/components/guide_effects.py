@@ -29,7 +29,7 @@ SHORTEST = 1e-9
 """Shortest half range of a curve, m."""
 NEARLY = 0.1
 """Share of the half range by which the middle of a range that counts as symmetric may be off."""
-WAVES, MOST_WAVES = 3.0, 512.0
+FEWEST_WAVES, MOST_WAVES = 3.0, 512.0
 """Bounds of the number of cogging waves along the stroke. Fewer than the smallest are a force that
 depends on position, more than the largest are not looked for."""
 SPREAD_WAVES = 40.0
@@ -98,11 +98,11 @@ def _slack(context: Context) -> Starts:
 
 def _cogging(context: Context) -> Starts:
     force, stroke = context.scales.force, context.scales.stroke
-    spread = 2.0 * stroke / np.geomspace(WAVES, SPREAD_WAVES, 24)
+    spread = 2.0 * stroke / np.geomspace(FEWEST_WAVES, SPREAD_WAVES, 24)
     pitches = (*spread.tolist(), *context.scales.pitches)
     # The step changes the number of the shortest waves along the stroke by a twentieth.
     step = min(0.002 * stroke, 0.05 * min(pitches) ** 2 / (2.0 * stroke))
-    bounds = ((0.0, 1e7), (2.0 * stroke / MOST_WAVES, 2.0 * stroke / WAVES), (-6.3, 6.3))
+    bounds = ((0.0, 1e7), (2.0 * stroke / MOST_WAVES, 2.0 * stroke / FEWEST_WAVES), (-6.3, 6.3))
     shapes = round(MOST_WAVES) if context.scales.pitches else 0
     return _waves(0.03 * force, pitches, (0.003 * force, step, 0.05), bounds, shapes)
 

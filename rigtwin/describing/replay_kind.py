@@ -233,9 +233,9 @@ def _question(
     ]
     if pulling and not measured and any(actuator_on(mechanism, j) is None for j in joints):
         return RigtwinError(
-            f"actuator {pulling[0]} pulls a tendon; only a motor on a fixed tendon whose joints "
-            "have no other actuator is understood without a written description: see "
-            "docs/machines.md, joints that are free"
+            f"actuator {pulling[0]} pulls a tendon; without a written description only a motor, or "
+            "a servo without a gear, on a fixed tendon whose joints have no other actuator is "
+            "understood: see docs/machines.md, joints that are free"
         )
     if not measured and not commanded:
         joint = joints[0]

@@ -29,11 +29,13 @@ def actuator_on(mechanism: Mechanism, joint: str) -> str | None:
     for name in mechanism.names("actuator"):
         if mechanism.joint_of("actuator", name) == joint:
             return name
-    pulling = [name for name in _tendon_motors(mechanism) if _passed(mechanism, name)[0] == joint]
+    pulling = [
+        name for name in _tendon_actuators(mechanism) if _passed(mechanism, name)[0] == joint
+    ]
     return pulling[0] if pulling else None
 
 
-def _tendon_motors(mechanism: Mechanism) -> list[str]:
+def _tendon_actuators(mechanism: Mechanism) -> list[str]:
     """Return the motors and servos on fixed tendons that pass no joint with another actuator."""
     passed = {name: _passed(mechanism, name) for name in mechanism.names("actuator")}
     moved = [joint for joints in passed.values() for joint in joints]

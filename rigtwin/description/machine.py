@@ -31,8 +31,8 @@ FORM = {"position": 0.003, "velocity": 0.003, "force": 0.01, "command": 0.01}
 accurately than motions."""
 OWN = "own"
 """Entry of a recording's controller settings that marks a custom controller."""
-PER_CHANNEL = " per unit of the channel"
-"""End of the unit of a parameter that refers to a recorded channel."""
+CHANNEL = "unit of the channel"
+"""Unit of a recorded channel in the units of declared parameters."""
 TURNING = {
     "m": "rad",
     "N": "Nm",
@@ -265,7 +265,9 @@ class Machine:
             return unit
         if "unit of the command" in unit:
             unit = unit.replace("unit of the command", component.unit or "1")
-        unit, per, _ = unit.partition(PER_CHANNEL)
+        if unit == CHANNEL:
+            return component.unit or "unit"
+        unit, per, _ = unit.partition(f" per {CHANNEL}")
         # Parameters are declared for slides; at a hinge the same number is in angular units.
         turned = TURNING.get(unit, unit) if component.turns else unit
         return f"{turned}/{component.unit or 'unit'}" if per else turned

@@ -8,15 +8,14 @@ import numpy as np
 from numpy.fft import rfft
 from numpy.typing import NDArray
 
+from rigtwin.components.guide_effects import FEWEST_WAVES, MOST_WAVES
 from rigtwin.diagnosis.space import Space
 from rigtwin.numerics.arrays import Array
 
 Responses = Sequence[tuple[tuple[float, ...], NDArray[np.float32]]]
 """Values of an effect, and the whitened response to each."""
 PLACES = 4096
-"""Number of intervals into which the stroke is divided."""
-FEWEST_WAVES, MOST_WAVES = 3, PLACES // 8
-"""Bounds of the number of waves along the stroke. Each has at least eight intervals."""
+"""Number of intervals into which the stroke is divided: eight for each of the shortest waves."""
 SMOOTH = 5
 """Degree of the polynomial in the position that is taken for another force."""
 
