@@ -107,6 +107,17 @@ def test_one_part_is_named_once_and_joints_have_no_article():
     assert "; the rail has a coulomb" in said
 
 
+def test_a_sentence_asserts_only_what_is_likely():
+    effects = [
+        finding("rail", kind, confidence)
+        for kind, confidence in (("coulomb", 0.97), ("viscous", 0.7), ("stribeck", 0.3))
+    ]
+    said = sentence("explained", effects, (), gap("it"))
+    assert said.startswith("The rail has a coulomb")
+    assert "; the rail probably has a viscous" in said
+    assert "; the rail may have a stribeck" in said
+
+
 def test_a_sentence_tells_the_greatest_of_many_effects():
     effects = [finding(f"joint_{n}", "coulomb", 0.97, share=n / 100.0) for n in range(1, 10)]
     said = sentence("explained", effects, (), gap("it"))

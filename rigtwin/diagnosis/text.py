@@ -16,6 +16,8 @@ STATIC = ("noise", "hum", "quantisation", "setting", "missed_ticks")
 """Kinds that are read off signals or commands; correcting them changes no prediction."""
 MOST_EFFECTS = 5
 """Effects that one sentence lists at most."""
+VERBS = ((0.8, "has"), (0.5, "probably has"), (0.0, "may have"))
+"""Least confidence of an effect, and the verb with which a sentence states it."""
 UNBOUNDED = 1e9
 """Nominal values from this magnitude on mean that the twin has no such limit."""
 GAP_TO_CLOSE = 1.05
@@ -245,18 +247,19 @@ def sentence(
 
 
 def _list_effects(effects: Sequence[Finding]) -> str:
-    """List the largest effects, in one clause for each component, and count the others."""
+    """List the largest effects, a clause for each component and verb, and count the others."""
     shown = list(effects)
     more = ""
     if len(effects) > MOST_EFFECTS:
         shown = sorted(effects, key=lambda effect: -effect.share)[:MOST_EFFECTS]
         more = f"; and {len(effects) - MOST_EFFECTS} more effects that are smaller"
-    parts: dict[str, list[str]] = {}
+    parts: dict[tuple[str, str], list[str]] = {}
     for effect in shown:
-        parts.setdefault(effect.name.component, []).append(_describe_effect(effect))
+        verb = next(verb for least, verb in VERBS if effect.confidence >= least)
+        parts.setdefault((effect.name.component, verb), []).append(_describe_effect(effect))
     listed = "; ".join(
-        f"{_with_article(component)} has {enumerate_words(descriptions)}"
-        for component, descriptions in parts.items()
+        f"{_with_article(component)} {verb} {enumerate_words(descriptions)}"
+        for (component, verb), descriptions in parts.items()
     )
     return listed + more
 
