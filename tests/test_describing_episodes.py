@@ -81,7 +81,7 @@ def test_a_second_log_may_hold_one_test_or_several(tmp_path: Path):
         ("episode", [0] * 30 + [1] * 30, True),
         ("run_id", [3] * 30 + [1] * 30, True),
         ("episode", [0] * 60, False),
-        ("episode", [0] * 30 + [1] * 5, False),
+        ("episode", [0] * 30 + [1] * 4, False),
         ("episode", [0] * 30 + [1] * 30 + [0] * 30, False),
         ("episode", [0] * 30 + [0.5] * 30, False),
         ("episode_reward", [0] * 30 + [1] * 30, False),

@@ -10,7 +10,7 @@ from rigtwin.importing.columns import Columns
 from rigtwin.importing.episodes import split_episodes
 from rigtwin.numerics.arrays import Array
 
-SHORTEST = 20
+SHORTEST = 5
 """Rows of a test; a column that changes more often counts something else."""
 
 

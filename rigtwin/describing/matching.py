@@ -47,6 +47,7 @@ def match_columns(
         Every other column → why it is not used.
     """
     aliases, joints = list_aliases(mechanism), movable_joints(mechanism)
+    leading = _leading(mechanism, joints)
     matches: list[Match] = []
     unused: dict[str, str] = {}
     numbered: dict[str, tuple[str, ...]] = {}
@@ -67,7 +68,7 @@ def match_columns(
         # Two numbers could be the joint and something else, such as a sample: no match.
         elif sum(word.isdigit() for word in words) == 1:
             numbered[column] = words
-        elif (match := _by_kind(mechanism, column, words, unit, joints)) is not None:
+        elif (match := _by_kind(mechanism, column, words, unit, leading)) is not None:
             matches.append(match)
         else:
             unused[column] = UNNAMED
@@ -79,13 +80,23 @@ def match_columns(
         )
         matches += matched
         unused |= {column: reason for column in family} if reason else {}
-    if (match := _remaining(columns, joints, matches, unused)) is not None:
+    if (match := _remaining(columns, leading, matches, unused)) is not None:
         matches.append(match)
         del unused[match.column]
     for match in matches:
         if match.quantity is JointQuantity.OTHER:
             unused[match.column] = "no test needs this quantity"
     return [match for match in matches if match.quantity is not JointQuantity.OTHER], unused
+
+
+def _leading(mechanism: Mechanism, joints: Sequence[str]) -> list[str]:
+    """Joints without those that only follow a driven one by an equality, as a counterweight does.
+
+    A column without the name of a joint is not taken for that of a follower.
+    """
+    driven = [joint for joint in joints if actuator_on(mechanism, joint) is not None]
+    followers = {tie.joint for tie in mechanism.ties_of(driven)[0]}
+    return [joint for joint in joints if joint not in followers]
 
 
 def _distinct(columns: Columns) -> list[str]:
@@ -190,7 +201,7 @@ def _by_kind(
         return None
     if quantity is not None:
         kind, owners = _owners(mechanism, quantity, words, unit, joints)
-    elif len(words) == 1 and words[0] in COORDINATES:
+    elif len(told := set(words) - MEASURED) == 1 and told <= COORDINATES:
         # Of "position" and "x", the first one says more clearly what it is.
         quantity, rank = JointQuantity.POSITION, 0.6
         kind, owners = "slide", [joint for joint in joints if not mechanism.turns(joint)]

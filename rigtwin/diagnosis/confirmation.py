@@ -72,6 +72,7 @@ def confirm(
     Confirmation
         The hypothesis, or what is left of it.
     """
+    evidence = evidence.near(fit.plant)
     fitter = Fitter(evidence)
     scorer = Scorer(fitter)
     current = refit_with_tolerances(fitter, fit, PERTURBATIONS)

@@ -61,7 +61,7 @@ def runs_backwards(
     model = machine.physics.model(machine, reversed_recording.inputs, configuration, STEPS)
     replayed = measured[:, ::-1]
     backward = _misfits(replayed, model.predict(configuration.plant))
-    # `_misfits` leaves out means, so that a prediction of 0 misses the swing and nothing else.
+    # `_misfits` leaves out straight lines, so that a prediction of 0 misses the swing about one.
     whole = _misfits(replayed, np.zeros_like(replayed))
     return (
         bool(np.isfinite(backward).all())
@@ -71,9 +71,14 @@ def runs_backwards(
 
 
 def _misfits(measured: Array, predicted: Array) -> Array:
-    """Return the standard deviation of each signal's residual in units of its noise, (rows,)."""
-    residual = measured - predicted
-    residual = residual - residual.mean(axis=1, keepdims=True)
+    """Return the standard deviation of each signal's residual about a straight line, shape (rows,).
+
+    It is in units of the signal's noise. A straight line has no direction in time: a servo that
+    lags behind a ramp does so backwards as well.
+    """
+    from scipy.signal import detrend  # Imported late: scipy is slow to load.
+
+    residual = detrend(measured - predicted, axis=1)
     # A signal without visible noise, such as a computed command, must not have an infinite misfit.
     noise = [max(white_noise(row), 1e-12 * rms(row), 1e-300) for row in measured]
     return np.sqrt(np.mean(residual**2, axis=1)) / np.array(noise)

@@ -228,6 +228,12 @@ class Evidence:
         coarse.models = [model.halve_steps() for model in self.models]
         return coarse
 
+    def near(self, plant: Plant) -> Evidence:
+        """Return the same evidence for plants that resemble one, which are predicted faster."""
+        similar = copy(self)
+        similar.models = [model.near(plant) for model in self.models]
+        return similar
+
     def thin(self) -> Evidence:
         """Return the same evidence with fewer ticks where the models allow it, for a search."""
         # Other ticks have other spectra, so unlike in `halve_steps` the lines are computed anew.

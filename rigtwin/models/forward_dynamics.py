@@ -18,6 +18,7 @@ from rigtwin.models.basis import Passage, forms
 from rigtwin.models.coupled_joints import CoupledJoints
 from rigtwin.models.joint import SEED, SMALL
 from rigtwin.models.model import Form, Model
+from rigtwin.models.windows import Window
 from rigtwin.numerics.arrays import Array
 from rigtwin.recording import Inputs
 from rigtwin.signals.motion import smooth
@@ -46,7 +47,16 @@ class ForwardDynamicsModel(CoupledJoints, Model[Plant]):
     def double_steps(self) -> ForwardDynamicsModel:
         return self._with_steps(2 * self._steps)
 
+    def near(self, plant: Plant) -> ForwardDynamicsModel:
+        if self._starts.linear:
+            return self
+        return self._with_windows(self._steps, self._starts.near(plant, self._sense_from(plant)))
+
     def _with_steps(self, steps: int) -> ForwardDynamicsModel:
+        # How well the start is known hardly depends on the integration steps.
+        return self._with_windows(steps, self._starts.windows)
+
+    def _with_windows(self, steps: int, windows: tuple[Window, ...]) -> ForwardDynamicsModel:
         return ForwardDynamicsModel(
             self._machine,
             self._replay,
@@ -55,8 +65,7 @@ class ForwardDynamicsModel(CoupledJoints, Model[Plant]):
             steps,
             self.every,
             self._starts.linear,
-            # How well the start is known hardly depends on the integration steps.
-            self._starts.windows,
+            windows,
         )
 
     @property

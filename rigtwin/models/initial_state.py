@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -29,6 +30,9 @@ PASSES = 3
 """Largest number of times that the derivatives are taken at a new state."""
 FALLS = 0.6
 """Share to which a pass must lower the residual for another one to follow."""
+NEAR = 0.3
+"""Steps of the derivatives about a fitted state, in standard errors of the state as read: a fitted
+state is more certain, but dry friction has kinks."""
 Sense = Callable[[Array, int], Array]
 """Function of an initial state, shape (2, coordinates), and a number of ticks that returns the
 predicted rows, shape (rows, ticks)."""
@@ -67,6 +71,22 @@ class Seen:
 
 
 @dataclass(frozen=True)
+class Neighbour:
+    """Fitted initial state of a similar machine, from which the fits of others begin.
+
+    Attributes
+    ----------
+    swinging : bool
+        Argument of `InitialState.read` that gives the state as read.
+    moved : Array
+        Difference from the state as read, in standard errors, shape (unknowns,).
+    """
+
+    swinging: bool
+    moved: Array
+
+
+@dataclass(frozen=True)
 class Judged:
     """Data by which an initial state is fitted.
 
@@ -82,11 +102,13 @@ class Judged:
         Standard errors of the state as read, shape (2 · free joints,).
     slopes : Array
         Change of the rows by one standard error of each unknown, shape (rows · ticks, unknowns).
-        They are those of the nominal machine, which serve for all candidates.
+        They are those of the nominal machine, or of the neighbour, and serve for all candidates.
     ticks : int
         Ticks for which the machine remembers its initial state.
     responses : Array
         Change of all rows by each error, shape (all rows, all ticks, unknowns).
+    neighbour : Neighbour or None
+        State from which a fit begins; None for the state as read.
     """
 
     rows: tuple[int, ...]
@@ -96,6 +118,7 @@ class Judged:
     slopes: Array
     ticks: int
     responses: Array
+    neighbour: Neighbour | None = None
 
     @cached_property
     def squares(self) -> Array:
@@ -326,35 +349,81 @@ class InitialState:
         sense
             Prediction from any initial state.
         """
-        start, judged = self.read(plant), self._judged
+        judged = self._judged
         if judged is None:
-            return start
+            return self.read(plant)
+        return self._find(judged, plant, sense)[1]
+
+    def near(self, plant: Plant, sense: Sense) -> InitialState:
+        """Return the initial state with fits that begin at that of a machine.
+
+        Fits of similar machines then take fewer predictions.
+
+        Parameters
+        ----------
+        plant
+            Components of the machine.
+        sense
+            Prediction of that machine from any initial state.
+        """
+        judged = self._judged
+        if judged is None:
+            return self
+        swinging, fitted = self._find(judged, plant, sense)
+        first, state = self._free(self.read(plant, swinging)), self._free(fitted)
+        predict = self._from(fitted, judged.rows, sense, judged.ticks)
+        slopes = find_slopes(predict, state, NEAR * judged.errors, predict(state)) / NEAR
+        neighbour = Neighbour(swinging, (state - first) / judged.errors)
+        other = copy(self)
+        other._judged = replace(judged, slopes=slopes, neighbour=neighbour)
+        return other
+
+    def _find(self, judged: Judged, plant: Plant, sense: Sense) -> tuple[bool, Array]:
+        """Fit the initial state.
+
+        Returns whether the state as read is swinging, and the fitted state, shape
+        (2, coordinates).
+        """
 
         def miss(start: Array) -> Array:
             return sense(start, judged.ticks)[list(judged.rows)] - judged.measured
 
-        # Without a position sensor, both guesses are tried: at rest in the MJCF, and swinging.
-        starts = [start]
-        if self._unplaced[: self.loose].any():
-            starts.append(self.read(plant, swinging=True))
-        misses = [miss(each) for each in starts]
-        powers = [float(np.sum(np.mean(each**2, axis=1) / judged.held**2)) for each in misses]
-        best = int(np.argmin(powers))
-        fitted = starts[best].copy()
-        predict = self._from(fitted, judged.rows, sense, judged.ticks)
-        state = self._fit(judged, predict, self._free(fitted), misses[best])
+        neighbour = judged.neighbour
+        if neighbour is not None:
+            swinging, first = neighbour.swinging, self.read(plant, neighbour.swinging)
+            begun = first.copy()
+            moved = self._free(first) + neighbour.moved * judged.errors
+            begun[:, : self.loose] = moved.reshape(2, -1)
+            residual = miss(begun)
+        else:
+            # Without a position sensor, both guesses are tried: at rest in the MJCF, and swinging.
+            guesses = (False, True) if self._unplaced[: self.loose].any() else (False,)
+            starts = [self.read(plant, guess) for guess in guesses]
+            misses = [miss(each) for each in starts]
+            powers = [float(np.sum(np.mean(each**2, axis=1) / judged.held**2)) for each in misses]
+            best = int(np.argmin(powers))
+            swinging, first, residual = guesses[best], starts[best], misses[best]
+            begun = first
+        predict = self._from(begun, judged.rows, sense, judged.ticks)
+        state = self._fit(judged, predict, self._free(first), self._free(begun), residual)
+        fitted = begun.copy()
         fitted[:, : self.loose] = state.reshape(2, -1)
-        return fitted
+        return swinging, fitted
 
     def _fit(
-        self, judged: Judged, predict: Callable[[Array], Array], first: Array, residual: Array
+        self,
+        judged: Judged,
+        predict: Callable[[Array], Array],
+        first: Array,
+        begun: Array,
+        residual: Array,
     ) -> Array:
         """Fit the state of the free joints in several passes, shape (2 · free joints,).
 
-        `residual` is that of `first`, the state as read, shape (rows, ticks). A further pass takes
-        the derivatives at the state that the last one found, as chaotic motion demands.
+        `first` is the state as read, and `residual` that of `begun`, shape (rows, ticks). A further
+        pass takes the derivatives at the state that the last one found, as chaotic motion demands.
         """
-        slopes, state, share = judged.slopes, first, 1.0
+        slopes, state, share = judged.slopes, begun, 1.0
         for _ in range(PASSES):
             rms = np.sqrt(np.mean(residual**2, axis=1))
             # A wrong model must not be blamed on the initial state: its residual widens the

@@ -127,6 +127,13 @@ class Model(ABC, Generic[P]):
         """Whether predictions are corrected to first order for errors of the initial state."""
         return False
 
+    def near(self, plant: P) -> Model[Any]:
+        """Return the model for predictions of plants that resemble one.
+
+        Initial states that are fitted are then sought from those of that plant on.
+        """
+        return self
+
     def thin(self, longest: float) -> Model[Any]:
         """Return a coarser model for a search.
 

@@ -10,7 +10,7 @@ techniques for ODE, in: Numerical Treatment of Inverse Problems (1983) 95].
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -134,6 +134,21 @@ class WindowStarts:
             return self._move(plant, key, sense)[0]
         return self._found.recall(key, lambda: self._find(plant, sense))
 
+    def near(self, plant: Plant, sense: Sense) -> tuple[Window, ...]:
+        """Return the windows with fits of their initial states that begin at those of a machine.
+
+        Parameters
+        ----------
+        plant
+            Components of the machine.
+        sense
+            Prediction of that machine from any initial state.
+        """
+        return tuple(
+            replace(window, state=window.state.near(plant, _from(sense, window)))
+            for window in self.windows
+        )
+
     def correct(self, plant: Plant, key: Hashable, sense: Sense, predicted: Array) -> Array:
         """Correct a prediction for errors of all initial states, to first order.
 
@@ -165,12 +180,7 @@ class WindowStarts:
 
     def _find(self, plant: Plant, sense: Sense) -> Array:
         """Return the fitted initial states, shape (windows, 2, coordinates)."""
-
-        def find(window: Window) -> Array:
-            first = window.first
-            return window.state.find(plant, lambda start, n: sense(start, first, first + n))
-
-        return np.stack([find(window) for window in self.windows])
+        return np.stack([window.state.find(plant, _from(sense, window)) for window in self.windows])
 
     def _move(self, plant: Plant, key: Hashable, sense: Sense) -> tuple[Array, Array]:
         """Return the states that a prediction starts from, and how far they are from those read.
@@ -191,3 +201,8 @@ class WindowStarts:
             return np.stack([state for state, _ in moved]), np.stack([by for _, by in moved])
 
         return self._moved.recall(key, move)
+
+
+def _from(sense: Sense, window: Window) -> Callable[[Array, int], Array]:
+    """Return the prediction from an initial state, and for a number of ticks, of a window."""
+    return lambda start, ticks: sense(start, window.first, window.first + ticks)
