@@ -15,7 +15,13 @@ from rigtwin.describing.quantity import SI, JointQuantity
 from rigtwin.describing.question import Question, option
 from rigtwin.describing.replay_kind import command_quantities, takes_force
 from rigtwin.describing.signal import LogSignal
-from rigtwin.describing.units import Unit, actuator_constant, command_unit
+from rigtwin.describing.units import (
+    PERCENT,
+    Unit,
+    actuator_constant,
+    command_unit,
+    largest_control,
+)
 from rigtwin.description.joint_elements import actuator_on
 from rigtwin.importing.units import is_unit, unit_of
 from rigtwin.numerics.arrays import Array
@@ -174,6 +180,7 @@ def commanded_force(log: Log, joint: str) -> LogSignal | None:
         quantity=JointQuantity.FORCE,
         unit=si if signal.unit == "1" else signal.unit,
         scale=signal.scale * constant,
+        from_command=True,
         assumed=(f"the command, times {constant:g}, taken as the force in {si}",),
     )
 
@@ -228,6 +235,12 @@ def _control(log: Log, joint: str, quantity: JointQuantity) -> LogSignal | None:
         stated = unit or stated_unit(split_words(column))
         scale = unit_of(stated)[1] if is_unit(stated) and unit_of(stated)[0] == "A" else 1.0
         unit, assumed = "", (f"{'A' if scale == 1.0 else stated} of the actuator's control",)
+    if unit == PERCENT:
+        most = largest_control(log.mechanism, actuator_on(log.mechanism, joint) or "")
+        # Without a range, the control itself is 1 at 100 %, as the unit says.
+        if most is not None:
+            unit, scale = "", 0.01 * most
+            assumed = (f"100 % is the largest control, {most:g}",)
     signal = LogSignal(
         joint=joint,
         quantity=quantity,

@@ -20,6 +20,7 @@ from dataclasses import dataclass
 from rigtwin.describing.described import Described, describe_log
 from rigtwin.describing.log import STATED
 from rigtwin.describing.quantity import JointQuantity
+from rigtwin.describing.reading import Reading
 from rigtwin.describing.replay_kind import are_servos
 from rigtwin.description.coupling import are_coupled
 from rigtwin.description.implied import FORCES, INVERSE, SERVOS
@@ -49,12 +50,15 @@ class OtherView:
         Share of the gap that the answer of this view must close to take the place of the first.
     reason
         Why the log is judged so, for a note.
+    of_commands
+        Whether the view is for logs whose forces are those of commands; others are for the rest.
     """
 
     test: str
     below: float
     least: float
     reason: str
+    of_commands: bool = False
 
 
 VIEWS = {
@@ -83,6 +87,14 @@ VIEWS = {
             1.0,
             "the logged forces are taken as commands, as no model explains them as forces along "
             "the measured motion; --test inverse-dynamics takes them as measured",
+        ),
+        OtherView(
+            FORCES,
+            ENOUGH,
+            MOST,
+            "judged by the motion that the commands cause, as no model explains them as forces "
+            "along the measured motion; --test inverse-dynamics judges these",
+            of_commands=True,
         ),
     ),
 }
@@ -116,8 +128,12 @@ def describe_otherwise(described: Described, view: OtherView) -> Described | Non
     if described.test or reading.velocities or reading.idle:
         return None
     mechanism = Mechanism(described.machine.model)
-    if view.test == FORCES and not _may_be_commands(described, mechanism):
-        return None
+    if view.test == FORCES:
+        are_commands = _are_commands(reading)
+        if view.of_commands != are_commands:
+            return None
+        if not are_commands and not _may_be_commands(described, mechanism):
+            return None
     if view.test == SERVOS and not are_servos(mechanism, reading.joints):
         return None
     try:
@@ -125,6 +141,12 @@ def describe_otherwise(described: Described, view: OtherView) -> Described | Non
     except RigtwinError:
         # The log lacks the force or the command of some joint.
         return None
+
+
+def _are_commands(reading: Reading) -> bool:
+    """Return whether the forces of a log are those of commands."""
+    forces = [s for s in reading.signals if s.quantity is JointQuantity.FORCE]
+    return bool(forces) and all(signal.from_command for signal in forces)
 
 
 def _may_be_commands(described: Described, mechanism: Mechanism) -> bool:

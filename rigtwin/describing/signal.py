@@ -39,6 +39,8 @@ class LogSignal:
         Result of a check against the model; empty without one.
     wrap
         Range within which an angle begins again, in the column's unit; None of a continuous signal.
+    from_command
+        Whether the signal is the force that a command stands for.
     """
 
     joint: str
@@ -52,6 +54,7 @@ class LogSignal:
     scale: float = 1.0
     checked: str = ""
     wrap: float | None = None
+    from_command: bool = False
 
     @property
     def key(self) -> str:

@@ -317,3 +317,11 @@ def actuator_constant(mechanism: Mechanism, actuator: str) -> float:
     force = float(model.actuator_gear[number, 0]) * float(model.actuator_gainprm[number, 0])
     moved = mechanism.acts_on("actuator", actuator) if actuator else ()
     return force * moved[0][1] if moved else force
+
+
+def largest_control(mechanism: Mechanism, actuator: str) -> float | None:
+    """Return the largest control of an actuator by its range; None where it has none."""
+    number = mujoco.mj_name2id(mechanism.model, mujoco.mjtObj.mjOBJ_ACTUATOR, actuator)
+    if number < 0 or not mechanism.model.actuator_ctrllimited[number]:
+        return None
+    return float(np.abs(mechanism.model.actuator_ctrlrange[number]).max())

@@ -12,8 +12,8 @@ from rigtwin.importing.units import is_unit
 def split_unit(name: str, unit: str) -> tuple[str, str]:
     """A name and its unit, which may stand in brackets behind it."""
     match = re.fullmatch(r"(.*?)\s*[\[(]([^\])]*)[\])]\s*", name)
-    if re.fullmatch(r".*\S\[\d+\]", name):
-        return name, unit  # An index, q[1]; the unit one has a blank before it, "strain [1]".
+    if re.fullmatch(r".*\S[\[(]\d+[\])]", name):
+        return name, unit  # An index, q[1] or q(1); the unit one has a blank: "strain [1]".
     if match and not unit and match.group(1) and is_unit(match.group(2)):
         return match.group(1).strip(), match.group(2)
     return name.strip(), re.sub(r"^[\[(]|[\])]$", "", unit)
