@@ -189,7 +189,7 @@ def _loaded(context: Context) -> Starts:
 def _lever(axis: str) -> Kind:
     return Kind(
         f"lever_{axis}",
-        f"centre of mass displaced along {axis}",
+        f"centre of mass along {axis}",
         (f"centre_{axis}",),
         f"centre of mass elsewhere along the body's own {axis}",
         {Body: _displaced},

@@ -204,10 +204,8 @@ def _add_group(
         add_tendons(mechanism, joints, tables)
         for name in movers if test == SERVOS else ():
             tables[name]["effects"] = FREE_SERVO
-        for joint, name in zip(joints, sensors, strict=True) if test == SERVOS else ():
-            # The zero of a servo's encoder shows in the gravity loads alone.
-            if any(mechanism.joint(joint).gravity):
-                tables[name]["effects"] = ["offset"]
+        for joint, name in zip(joints, sensors, strict=True):
+            tables[name]["effects"] = _sensor_effects(mechanism, joint, test, joint in velocities)
     elif test != POSITIONS:
         add_mass(mechanism, joints[0], tables)
         add_rotor(joints[0], tables)
@@ -216,6 +214,20 @@ def _add_group(
             # The gravity load depends on the true angle, which makes the encoder's zero observable.
             tables[sensors[0]]["effects"] = ["offset"]
     implied.replays.append(replay)
+
+
+def _sensor_effects(mechanism: Mechanism, joint: str, test: str, has_velocity: bool) -> list[str]:
+    """Return the effects of a sensor of a joint that moves together with others."""
+    effects: list[str] = []
+    if test == SERVOS and any(mechanism.joint(joint).gravity):
+        # The zero of a servo's encoder shows in the gravity loads alone.
+        effects.append("offset")
+    # The servo acts by the reading of its own encoder. A late sensor of a joint that no servo moves
+    # lags behind the motion that the commands, or the other joints, cause.
+    is_servo = test == SERVOS and actuator_on(mechanism, joint) is not None
+    if not is_servo and not has_velocity:
+        effects.append("delay")
+    return effects
 
 
 def _add_forces(

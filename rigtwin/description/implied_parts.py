@@ -30,6 +30,8 @@ FREE = [
 """Effects at coupled joints that are free to move."""
 UP = 0.5
 """Share of the largest component of gravity from which an axis counts as vertical."""
+ALONG = 0.9
+"""Component of a joint's axis from which the axis counts as one of its body's own."""
 FREE_SERVO = [
     "gains",
     "position_gain",
@@ -72,7 +74,20 @@ def add_free_joints(
     # Without a known force, only ratios of friction and masses to one of the masses can be seen.
     # One force of an actuator or a spring is enough, since coupled joints pass it on.
     unknown = free and not _has_spring(mechanism, joints)
-    add_links(mechanism, joints[1:] if unknown else joints, ["mass", "payload"], tables)
+    held = ["mass", "payload", *_levers(mechanism, joints[-1])]
+    add_links(mechanism, joints[1:] if unknown else joints, held, tables)
+
+
+def _levers(mechanism: Mechanism, joint: str) -> list[str]:
+    """Return the effects of a wrong centre of mass of the body that a joint moves.
+
+    A displacement along the joint's own axis changes no force of this joint, and a slide carries
+    its body whatever the place of the centre.
+    """
+    if not mechanism.turns(joint):
+        return []
+    axis = np.abs(mechanism.model.jnt_axis[mechanism.number("joint", joint)])
+    return [f"lever_{name}" for name, share in zip("xyz", axis, strict=True) if share < ALONG]
 
 
 def _has_spring(mechanism: Mechanism, joints: Sequence[str]) -> bool:

@@ -497,7 +497,8 @@ class Mechanism:
                 followed = data.qpos[self._place(tie.to)]
                 data.qpos[self._place(tie.joint)] = tie.offset + tie.ratio * followed
             mujoco.mj_forward(model, data)
-            load[step] = along @ data.qfrc_bias
+            # Bodies with `gravcomp` are held up by a passive force.
+            load[step] = along @ (data.qfrc_bias - data.qfrc_gravcomp)
         rest = float(model.qpos_spring[place])
         # Without gravity two points are enough, which keeps interpolation fast.
         gravity = tuple(load.tolist()) if np.any(np.abs(load) > 1e-12) else (0.0, 0.0)

@@ -16,6 +16,14 @@ from rigtwin.description.replay import ReplayOf
 
 ELEMENTS = (("free", mujoco.mjtJoint.mjJNT_FREE), ("ball", mujoco.mjtJoint.mjJNT_BALL))
 """Types of joints that no replay moves, with their MJCF names."""
+FLAGS = (
+    (mujoco.mjtDisableBit.mjDSBL_SPRING, "spring"),
+    (mujoco.mjtDisableBit.mjDSBL_DAMPER, "damper"),
+    (mujoco.mjtDisableBit.mjDSBL_FRICTIONLOSS, "frictionloss"),
+    (mujoco.mjtDisableBit.mjDSBL_ACTUATION, "actuation"),
+    (mujoco.mjtDisableBit.mjDSBL_CLAMPCTRL, "clampctrl"),
+)
+"""Flags of the option element that change forces, with their MJCF names."""
 
 
 def overlooked(
@@ -39,9 +47,12 @@ def overlooked(
     """
     model = mechanism.model
     ties = _followed_ties(mechanism, components, replays)
+    moved = _moving(components, replays) | {tie.joint for tie in ties}
     return (
-        *_joints(model, components, replays, {tie.joint for tie in ties}),
+        *_joints(model, moved),
         *_dissipation(model, components),
+        *_limits(model, moved),
+        *_options(model, moved),
         *_polynomials(mechanism, components),
         *_constraints(model, {tie.number for tie in ties}),
         *_actuators(model, components),
@@ -76,14 +87,8 @@ def _name(model: mujoco.MjModel, kind: mujoco.mjtObj, number: int) -> str:
     return mujoco.mj_id2name(model, kind, number) or f"number {number}"
 
 
-def _joints(
-    model: mujoco.MjModel,
-    components: Mapping[str, Component],
-    replays: Sequence[ReplayOf],
-    tied: set[str],
-) -> Iterator[str]:
+def _joints(model: mujoco.MjModel, moved: set[str]) -> Iterator[str]:
     """Yield the joints that no replay moves, and the stops of joints with a range."""
-    moved = _moving(components, replays)
     for number in range(model.njnt):
         name = _name(model, mujoco.mjtObj.mjOBJ_JOINT, number)
         for word, kind in ELEMENTS:
@@ -91,7 +96,7 @@ def _joints(
                 yield f"joint {name}: it is a {word} joint, so it stays where it is"
                 break
         else:
-            if name not in moved | tied:
+            if name not in moved:
                 yield f"joint {name}: no replay moves it, so it stays where it is"
             if model.jnt_limited[number]:
                 # Contacts with the stops are constraints, which all models leave out.
@@ -115,6 +120,27 @@ def _dissipation(model: mujoco.MjModel, components: Mapping[str, Component]) -> 
         name = _name(model, mujoco.mjtObj.mjOBJ_TENDON, number)
         if ("tendon", name) not in described:
             yield f"tendon {name}: no component describes it"
+
+
+def _limits(model: mujoco.MjModel, moved: set[str]) -> Iterator[str]:
+    """Yield limits of tendons, and of the actuators' forces at joints that move."""
+    for number in np.flatnonzero(model.tendon_limited):
+        yield f"tendon {_name(model, mujoco.mjtObj.mjOBJ_TENDON, number)}: the limits of its length"
+    for number in np.flatnonzero(model.jnt_actfrclimited):
+        if (name := _name(model, mujoco.mjtObj.mjOBJ_JOINT, number)) in moved:
+            yield f"joint {name}: its actuatorfrcrange"
+
+
+def _options(model: mujoco.MjModel, moved: set[str]) -> Iterator[str]:
+    """Yield options of the model that change forces, which the components do not follow."""
+    for flag, word in FLAGS:
+        if model.opt.disableflags & flag:
+            yield f'option flag {word}="disable"'
+    if model.opt.disableactuator:
+        yield "option actuatorgroupdisable"
+    # Several joints have MuJoCo's own passive forces; the load of a single one is that of gravity.
+    if len(moved) == 1 and (model.opt.density or model.opt.viscosity):
+        yield "forces of the medium: density, viscosity and wind of the option"
 
 
 def _polynomials(mechanism: Mechanism, components: Mapping[str, Component]) -> Iterator[str]:

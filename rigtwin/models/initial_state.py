@@ -184,6 +184,8 @@ class InitialState:
         for name, seen in self._seen.items():
             sensor = sensor_of(plant, name)
             value, slope = self._begun[name]
+            # A late sensor shows where the joint was.
+            value += slope * (sensor.delay + sensor.lag)
             value = (value - sensor.offset) / sensor.gain
             if seen.kind == "position":
                 places.append(seen.along[None])

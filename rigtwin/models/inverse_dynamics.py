@@ -99,6 +99,7 @@ class InverseDynamicsModel(Model[Plant]):
         guides, rotors = machine.components_of(Guide), machine.components_of(Rotor)
         schedules = machine.components_of(Schedule)
         self._bodies = RigidBodies(machine.model, joints, guides, rotors)
+        self._rests = {guide.name: self._bodies.rest_of(guide) for guide in guides}
         self._heavy = {body.name: body.mjcf for body in machine.components_of(Body)}
         self._base = next((base.name for base in machine.components_of(Base)), None)
         self._along: dict[str, Array] = {}
@@ -236,7 +237,7 @@ class InverseDynamicsModel(Model[Plant]):
         out = load.copy()
         at_once = guide.compliance == guide.mount_compliance == guide.backlash == 0.0
         softest = softest_contact(guide, load, guide_motion[0], self._position_error(along))
-        guide_step = guide_step_of(guide, 1.0 / softest, 0.0, self._interval)
+        guide_step = guide_step_of(guide, 1.0 / softest, self._rests[name], self._interval)
         (resist_at_once if at_once else resist)(guide_step, guide_motion, out)
         return out - load
 

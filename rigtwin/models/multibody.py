@@ -19,7 +19,7 @@ import numpy as np
 from rigtwin.description.component import Component
 from rigtwin.description.mechanism import Mechanism, compile_model
 from rigtwin.models.bodies import Bodies, arrange_moments, find_terms
-from rigtwin.models.rigid import list_nominal, strip
+from rigtwin.models.rigid import list_nominal, rest_of, strip
 from rigtwin.numerics.arrays import Array
 
 UNCHANGED = 1e-9
@@ -97,10 +97,7 @@ class Multibody:
 
     def rest_of(self, component: Component) -> float:
         """Return the position at which the spring of a joint or tendon is slack, m or rad."""
-        model = self._model
-        if component.element == "tendon":
-            return float(np.mean(model.tendon_lengthspring[model.tendon(component.mjcf).id]))
-        return float(model.qpos_spring[model.jnt_qposadr[model.joint(component.mjcf).id]])
+        return rest_of(self._model, component)
 
     def place(self) -> Array:
         """Return the positions of the coordinates in the MJCF, m or rad, shape (coordinates,)."""

@@ -119,6 +119,21 @@ def strip(model: mujoco.MjModel, guides: Sequence[Component], rotors: Sequence[C
             model.dof_armature[model.joint(component.mjcf).dofadr[0]] = 0.0
 
 
+def rest_of(model: mujoco.MjModel, component: Component) -> float:
+    """Return the position at which the spring of a joint or tendon is slack, m or rad.
+
+    Parameters
+    ----------
+    model
+        MuJoCo model.
+    component
+        Guide at a joint or a fixed tendon.
+    """
+    if component.element == "tendon":
+        return float(np.mean(model.tendon_lengthspring[model.tendon(component.mjcf).id]))
+    return float(model.qpos_spring[model.jnt_qposadr[model.joint(component.mjcf).id]])
+
+
 def list_nominal(model: mujoco.MjModel, name: str) -> tuple[float, Array, Array]:
     """Return mass, centre of mass and inertia of a body in the model.
 
@@ -171,6 +186,10 @@ class RigidBodies:
         self._gravity = np.array(model.opt.gravity)
         self._places = np.array([model.jnt_qposadr[number] for number in numbers], np.int64)
         self._dofs = np.array([model.jnt_dofadr[number] for number in numbers], np.int64)
+
+    def rest_of(self, component: Component) -> float:
+        """Return the position at which a guide's spring is slack; see `rest_of`."""
+        return rest_of(self._model, component)
 
     def list_nominal(self, name: str) -> tuple[float, Array, Array]:
         """Return mass, centre of mass and inertia of a body in the MJCF; see `list_nominal`."""
