@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -22,7 +22,9 @@ from rigtwin.describing.units import (
     command_unit,
     largest_control,
 )
+from rigtwin.description.implied import FORCES, MOVERS
 from rigtwin.description.joint_elements import actuator_on
+from rigtwin.description.mechanism import Mechanism
 from rigtwin.importing.units import is_unit, unit_of
 from rigtwin.numerics.arrays import Array
 
@@ -156,7 +158,7 @@ def _velocity(position: Array, time: Array) -> Array:
 
 
 def commanded_force(log: Log, joint: str) -> LogSignal | None:
-    """Return the force that a command stands for; None where it is unknown.
+    """Return the force that a command stands for; None where the actuator may give another one.
 
     Parameters
     ----------
@@ -175,7 +177,7 @@ def commanded_force(log: Log, joint: str) -> LogSignal | None:
     if signal is None or (signal.formula and constant != 1.0):
         return None
     si = SI[JointQuantity.FORCE][log.mechanism.turns(joint)]
-    return replace(
+    force = replace(
         signal,
         quantity=JointQuantity.FORCE,
         unit=si if signal.unit == "1" else signal.unit,
@@ -183,6 +185,34 @@ def commanded_force(log: Log, joint: str) -> LogSignal | None:
         from_command=True,
         assumed=(f"the command, times {constant:g}, taken as the force in {si}",),
     )
+    return force if _is_given(log.mechanism, actuator, log.values(force)) else None
+
+
+def gives_commands(log: Log, joints: Sequence[str]) -> bool:
+    """Return whether the model's actuators give the force of each command, at once and unlimited.
+
+    Parameters
+    ----------
+    log
+        The log.
+    joints
+        Joints with commands.
+    """
+    used = {actuator_on(log.mechanism, joint) for joint in joints}
+    # A further actuator, such as a second motor, would push the joints as well.
+    if set(log.mechanism.names("actuator")) - used:
+        return False
+    return all(commanded_force(log, joint) is not None for joint in joints)
+
+
+def _is_given(mechanism: Mechanism, actuator: str, forces: Array) -> bool:
+    """Return whether an actuator gives the force of each command, at once and unlimited."""
+    if mechanism.actuator_timing(actuator) or mechanism.actuator_obstacle(actuator, MOVERS[FORCES]):
+        return False
+    low, high = mechanism.command_limits(actuator)
+    constant, most = mechanism.force_per_command(actuator)
+    commands = forces / constant if constant else np.zeros(1)
+    return bool(low <= commands.min() and commands.max() <= high and np.abs(forces).max() <= most)
 
 
 def no_force(joint: str) -> LogSignal:

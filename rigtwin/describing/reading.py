@@ -12,6 +12,7 @@ from rigtwin.describing.clock import Clock, find_clock
 from rigtwin.describing.command_signals import (
     commanded_force,
     force_command,
+    gives_commands,
     no_force,
     position_command,
 )
@@ -201,7 +202,15 @@ def _choose_movers(
     try:
         placed = all(signal.quantity is JointQuantity.POSITION for signal in signals)
         kind = choose_kind(
-            log.mechanism, log.slots, joints, list(forces), list(still), placed, test, by_servos
+            log.mechanism,
+            log.slots,
+            joints,
+            list(forces),
+            list(still),
+            placed,
+            test,
+            by_servos,
+            by_commands=gives_commands(log, joints),
         )
     except Question as question:
         before = len(log.questions)

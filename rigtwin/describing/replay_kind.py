@@ -51,6 +51,7 @@ def choose_kind(
     placed: bool,
     stated: str = "",
     by_servos: bool = False,
+    by_commands: bool = True,
 ) -> ReplayKind:
     """Choose the kind of test.
 
@@ -72,6 +73,8 @@ def choose_kind(
         Kind of test that the owner of the log states; empty without one.
     by_servos
         Whether the measured forces are those that the model's servos give.
+    by_commands
+        Whether the model's actuators give the forces of the commands, at once and unlimited.
 
     Raises
     ------
@@ -98,7 +101,8 @@ def choose_kind(
         if any(mechanism.falls_with_speed(actuator_on(mechanism, j) or "") for j in pushed):
             return ReplayKind(FORCES, "the actuators' commands are in the log")
         # Small errors of the forces make the predicted motion of an arm run away.
-        if placed and len(pushed) == len(joints) > 1 and are_coupled(mechanism, joints):
+        together = len(pushed) == len(joints) > 1 and are_coupled(mechanism, joints)
+        if placed and together and by_commands:
             why = "the actuators take forces, and those of every joint are in the log"
             return ReplayKind(INVERSE, why)
         return ReplayKind(FORCES, "the actuators take forces, and those are in the log")

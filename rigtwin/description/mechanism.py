@@ -258,11 +258,20 @@ class Mechanism:
         number = self.number("actuator", name)
         gear = float(self.model.actuator_gear[number, 0])
         gain = float(self.model.actuator_gainprm[number, 0])
+        return gear * gain, self._force_limit(number)
+
+    def _force_limit(self, number: int) -> float:
+        """Return the largest force of an actuator at what it moves, N or Nm; infinite without."""
+        model, limit = self.model, np.inf
         # MuJoCo limits the force before the gear, so the limit at the joint is |gear| · forcerange.
-        limit = np.inf
-        if self.model.actuator_forcelimited[number]:
-            limit = abs(gear) * float(self.model.actuator_forcerange[number, 1])
-        return gear * gain, limit
+        if model.actuator_forcelimited[number]:
+            gear = abs(float(model.actuator_gear[number, 0]))
+            limit = gear * float(model.actuator_forcerange[number, 1])
+        moved = int(model.actuator_trnid[number, 0])
+        at_joint = int(model.actuator_trntype[number]) == mujoco.mjtTrn.mjTRN_JOINT
+        if at_joint and model.jnt_actfrclimited[moved]:
+            limit = min(limit, float(model.jnt_actfrcrange[moved, 1]))
+        return limit
 
     def servo(self, name: str) -> dict[str, float] | None:
         """Return a position actuator's gains and force limit as parameters of a Servo.
@@ -279,9 +288,8 @@ class Mechanism:
         if not affine or not proportional or float(model.actuator_gear[number, 0]) != 1.0:
             return None
         parameters = {"position_gain": gain, "damping_gain": max(-float(bias[2]), 0.0)}
-        if model.actuator_forcelimited[number]:
-            parameters["force_limit"] = float(model.actuator_forcerange[number, 1])
-        return parameters
+        limit = self._force_limit(number)
+        return parameters | ({"force_limit": limit} if np.isfinite(limit) else {})
 
     def acts_on(self, element: str, name: str) -> tuple[tuple[str, float], ...]:
         """Return the joints on which a force along an element's coordinate acts.

@@ -123,11 +123,18 @@ def _dissipation(model: mujoco.MjModel, components: Mapping[str, Component]) -> 
 
 
 def _limits(model: mujoco.MjModel, moved: set[str]) -> Iterator[str]:
-    """Yield limits of tendons, and of the actuators' forces at joints that move."""
+    """Yield limits of tendons, and those of the actuators' forces that no actuator can have."""
     for number in np.flatnonzero(model.tendon_limited):
         yield f"tendon {_name(model, mujoco.mjtObj.mjOBJ_TENDON, number)}: the limits of its length"
+    pushed = model.actuator_trnid[model.actuator_trntype == mujoco.mjtTrn.mjTRN_JOINT, 0]
     for number in np.flatnonzero(model.jnt_actfrclimited):
-        if (name := _name(model, mujoco.mjtObj.mjOBJ_JOINT, number)) in moved:
+        name, (low, high) = (
+            _name(model, mujoco.mjtObj.mjOBJ_JOINT, number),
+            model.jnt_actfrcrange[number],
+        )
+        # The limit of a single actuator with the same limit in both directions is its own.
+        own = np.count_nonzero(pushed == number) == 1 and np.isclose(low, -high)
+        if name in moved and not own:
             yield f"joint {name}: its actuatorfrcrange"
 
 
@@ -166,7 +173,7 @@ def _constraints(model: mujoco.MjModel, followed: set[int]) -> Iterator[str]:
 
 
 def _actuators(model: mujoco.MjModel, components: Mapping[str, Component]) -> Iterator[str]:
-    """Yield bias forces of actuators that no component describes, and asymmetric force limits."""
+    """Yield actuators that no component describes but that act, and asymmetric force limits."""
     described = {part.mjcf for part in components.values() if part.element == "actuator"}
     for number in range(model.nactuator):
         name = _name(model, mujoco.mjtObj.mjOBJ_ACTUATOR, number)
@@ -174,6 +181,9 @@ def _actuators(model: mujoco.MjModel, components: Mapping[str, Component]) -> It
         pushes = model.actuator_biastype[number] != mujoco.mjtBias.mjBIAS_NONE and bias[:3].any()
         if name not in described and pushes:
             yield f"actuator {name}: its force without a command; no component describes it"
+        elif name not in described and described:
+            # Where commands move the machine, those of any other actuator would move it too.
+            yield f"actuator {name}: its command; no component describes it"
         low, high = model.actuator_forcerange[number]
         # A component has one force limit for both directions: the upper end of the range.
         if model.actuator_forcelimited[number] and not np.isclose(low, -high):
