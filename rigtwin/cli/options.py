@@ -102,6 +102,8 @@ def columns_of(parsed: argparse.Namespace) -> dict[str, str]:
         key, equals, source = text.partition("=")
         if not equals or not key.strip():
             raise RigtwinError(f"--column {text}: expected KEY=SOURCE, such as elbow.position=q2")
+        if key.strip() in stated:
+            raise RigtwinError(f"--column {text}: {key.strip()} is stated twice")
         stated[key.strip()] = source.strip()
     return stated
 

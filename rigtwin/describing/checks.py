@@ -12,6 +12,8 @@ from rigtwin.description.mechanism import Mechanism
 from rigtwin.numerics.arrays import Array
 from rigtwin.signals.noise import white_noise
 
+LARGEST = 1e100
+"""Largest force that is compared with the model's; the square of a larger one overflows."""
 SAMPLES = 2000
 """Rows at which inverse dynamics are worked out."""
 CORNER = 8.0
@@ -214,6 +216,8 @@ def _inverse(
 
 def _regress(measured: Array, needed: Array, speed: Array) -> Slope | None:
     """Slope of a measured force against that of the model, friction set aside."""
+    if float(np.abs(measured).max()) > LARGEST:
+        return None
     scale = float(np.std(speed))
     if scale == 0.0 or np.std(measured) == 0.0 or np.std(needed) == 0.0:
         return None

@@ -11,7 +11,7 @@ from rigtwin.describing.quantity import COMMANDED, TIME, TIME_UNITS, WORDS
 from rigtwin.describing.question import ask, enumerate_names, option
 from rigtwin.errors import RigtwinError
 from rigtwin.importing.columns import Columns
-from rigtwin.importing.timing import JITTER, find_period
+from rigtwin.importing.timing import JITTER, MOST_OFF, find_period, most_off
 from rigtwin.importing.units import unit_of
 from rigtwin.numerics.arrays import Array
 
@@ -100,10 +100,12 @@ def find_clock(columns: Columns, stated: str = "") -> Clock:
     # Rows that repeat a time stamp say nothing of the period.
     moving = np.concatenate([[True], np.diff(time) > 0.0])
     period = find_period(time[moving])
-    uneven = np.abs(np.diff(time[moving]) - period) > JITTER * period
+    stamps = time[moving]
+    uneven = np.abs(np.diff(stamps) - period) > JITTER * period
+    is_uneven = bool(uneven.any()) or most_off(stamps) > MOST_OFF * period
     # Three digits: the median of a jittering clock is not exact, and the intended period is a round
     # number.
-    resample = float(f"{float(np.median(np.diff(time[moving]))):.3g}") if uneven.any() else None
+    resample = float(f"{float(np.median(np.diff(stamps))):.3g}") if is_uneven else None
     return Clock(column, unit, period, resample, why, assumed)
 
 

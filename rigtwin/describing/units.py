@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -82,7 +83,14 @@ def known_unit(columns: Columns, column: str, si: str, key: str) -> Unit | None:
         If the file states the unit of another quantity, or percent.
     """
     written = columns.units.get(column, "")
-    if written == PERCENT:
+    word = stated_unit(split_words(column))
+    if _ambiguous_unit(column) and not written:
+        raise ask(
+            f"column {column!r} may be in degrees or in gon; which is it?",
+            option(key, f"{column} [deg]"),
+            option(key, f"{column} [gon]"),
+        )
+    if PERCENT in (written, word):
         raise ask(
             f"column {column!r} is in percent, and {key} is in {si}; how much is one percent?",
             option(key, f"FACTOR * {column}"),
@@ -95,10 +103,14 @@ def known_unit(columns: Columns, column: str, si: str, key: str) -> Unit | None:
             option(key, f"FACTOR * {column}"),
             option(key, "COLUMN"),
         )
-    word = stated_unit(split_words(column))
     if word and unit_of(word)[0] == si:
         return Unit(word, f"{word} by its name")
     return None
+
+
+def _ambiguous_unit(column: str) -> bool:
+    """Return whether a column's unit is "grad": the German degree, or a hundredth of 90 degrees."""
+    return bool(re.search(r"[\[(_ ]grads?[\])]?$", column.lower()))
 
 
 def position_units(

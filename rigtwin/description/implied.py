@@ -116,7 +116,7 @@ def _expand_replay(
     """Add the components and replays that a replay with the key `test` implies; note mistakes."""
     where = f"[[replays]] {table.get('name', len(implied.replays) + 1)}"
     test, known = table["test"], movable_joints(mechanism)
-    if test not in TESTS:
+    if not isinstance(test, str) or test not in TESTS:
         mistakes.note(where, f"test = {str(test)[:40]!r}; {suggest(test, TESTS)}")
         return
     joints = table.get("joints", known)

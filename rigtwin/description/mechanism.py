@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from copy import copy
+from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
 
@@ -149,6 +151,13 @@ class Mechanism:
         except mujoco.FatalError as error:
             # Such as contacts of more bodies than fit into MuJoCo's memory.
             raise RigtwinError(f"model {path}: {' '.join(str(error).split())}") from None
+
+    @cached_property
+    def _without_contacts(self) -> mujoco.MjModel:
+        """The model without contacts, which slow a gravity load down and do not enter it."""
+        model = copy(self.model)
+        model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
+        return model
 
     def names(self, element: str) -> list[str]:
         """Return the names of all elements of a kind; elements without a name are left out."""
@@ -476,7 +485,7 @@ class Mechanism:
 
         Raises RigtwinError unless the joint is a slide or a hinge.
         """
-        model, number = self.model, self.number("joint", name)
+        model, number = self._without_contacts, self.number("joint", name)
         kind = int(model.jnt_type[number])
         if kind not in (mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtJoint.mjJNT_HINGE):
             raise RigtwinError(f"joint {name}: expected one that slides or turns about one axis")

@@ -164,7 +164,7 @@ def _constraints(model: mujoco.MjModel, followed: set[int]) -> Iterator[str]:
     touching = np.count_nonzero((model.geom_contype != 0) | (model.geom_conaffinity != 0))
     if touching > 1 or model.npair:
         yield "contacts between its geoms"
-    for number in sorted(set(range(model.neq)) - followed):
+    for number in sorted(set(np.flatnonzero(model.eq_active0)) - followed):
         yield f"equality {_name(model, mujoco.mjtObj.mjOBJ_EQUALITY, number)}"
     if model.nflex:
         yield "flexible bodies"

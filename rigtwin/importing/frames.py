@@ -9,7 +9,7 @@ import numpy as np
 
 from rigtwin.errors import RigtwinError
 from rigtwin.importing.columns import Columns, numbers_of
-from rigtwin.importing.naming import name_items, repeated_names
+from rigtwin.importing.naming import name_items, repeated_names, split_unit
 from rigtwin.importing.selection import Selection
 from rigtwin.numerics.arrays import Array
 
@@ -57,6 +57,7 @@ def read_frame(data: object, selection: Selection) -> Columns:
             continue
         values |= numbers
         listed += numbers
+        unit = unit or split_unit(name, "")[1]
         units |= dict.fromkeys(numbers, unit) if unit else {}
     _require_one_length(values)
     return Columns(values, units, form, (), wrong, tuple(listed), refused)

@@ -203,13 +203,16 @@ def _look_at(line: str, separator: str, decimal: str) -> Line:
 def find_layout(lines: Sequence[str]) -> Layout | None:
     """Return the layout of a text; None if it has no lines of numbers."""
     best: tuple[tuple[int, int], Layout] | None = None
+    # Some programs leave a blank line after each row.
+    kept = [number for number, line in enumerate(lines[:HEADER]) if line.strip()]
+    rows = [lines[number] for number in kept]
     for separator in SEPARATORS:
         for decimal in (".", ","):
             if decimal == separator:
                 continue
             # Every combination is tried on the head: a decimal comma is only told from a
             # separating one by which reading gives the more columns of numbers.
-            seen = [_look_at(line, separator, decimal) for line in lines[:HEADER]]
+            seen = [_look_at(line, separator, decimal) for line in rows]
             first = next((n for n in range(len(seen)) if _begins(seen, n)), None)
             if first is None:
                 continue
@@ -218,17 +221,24 @@ def find_layout(lines: Sequence[str]) -> Layout | None:
             quality = (numbers, -SEPARATORS.index(separator))
             if (
                 separator == ","
-                and all("." not in line for line in lines[first : first + SURE])
+                and all("." not in line for line in rows[first : first + SURE])
+                and not (first and _names_columns(rows[first - 1], seen[first].cells))
                 # Numbers such as 1,5;2,5 split at commas give twice the columns; half of them is
                 # what another separator has to beat.
                 and numbers % 2 == 0
             ):
                 quality = (numbers // 2, -SEPARATORS.index(separator))
             if best is None or quality > best[0]:
-                begin = first + _is_numbering(lines[first : first + 2], separator)
+                begin = kept[first + _is_numbering(rows[first : first + 2], separator)]
                 plain = Layout(separator, decimal, begin, (), (), seen[first].words)
                 best = quality, _read_header(lines, plain, seen[first].cells)
     return None if best is None else best[1]
+
+
+def _names_columns(line: str, columns: int) -> bool:
+    """Return whether a line has as many names as there are columns, separated by commas."""
+    cells = split_cells(line, ",")
+    return len(cells) == columns and all(any(map(str.isalpha, cell)) for cell in cells)
 
 
 def _is_numbering(lines: Sequence[str], separator: str) -> bool:

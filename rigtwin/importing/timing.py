@@ -12,6 +12,9 @@ from rigtwin.numerics.arrays import Array
 
 JITTER = 0.5
 """Share of the period by which a time stamp may be off."""
+MOST_OFF = 5.0
+"""Largest distance of a time stamp from even ticks, in periods: rows that wait in a buffer come in
+bursts."""
 PLAUSIBLE = (1e-5, 0.1)
 """s; periods that a time column without a unit may have in seconds."""
 POSSIBLE = (1e-6, 10.0)
@@ -104,6 +107,11 @@ def require_plausible(period: float, said: bool) -> None:
     )
 
 
+def most_off(time: Array) -> float:
+    """Return the largest distance of time stamps from even ticks between the first and last, s."""
+    return float(np.max(np.abs(time - np.linspace(time[0], time[-1], len(time)))))
+
+
 def require_even_ticks(time: Array, period: float, report: list[str]) -> None:
     """Raise RigtwinError if the time stamps have gaps; report their drift and jitter."""
     steps = np.diff(time)
@@ -114,6 +122,12 @@ def require_even_ticks(time: Array, period: float, report: list[str]) -> None:
             f"{int(off.sum())} gaps in time, the first of {steps[at]:.4g} s at "
             f"{time[at] - time[0]:.4g} s where {period:g} s is the rule; take a stretch without "
             f"them by [time] start and until, or say [time] resample = {period:g}"
+        )
+    if (late := most_off(time)) > MOST_OFF * period:
+        raise RigtwinError(
+            f"time stamps are up to {late:.3g} s from even ticks, as where the rate changes within "
+            f"the log; take a stretch of one rate by [time] start and until, or say [time] "
+            f"resample = {period:g}"
         )
     drift = abs((time[-1] - time[0]) / (len(time) - 1) - period)
     # The drift over the whole test counts, not that of one period.
