@@ -159,3 +159,42 @@ def test_rows_may_hold_the_state_after_their_command(tmp_path: Path, friction: s
     for effect in answer.effects:
         assert effect.parameters["coulomb"].value == pytest.approx(FRICTION, rel=0.05)
     assert answer.verdict == ("explained" if friction else "no gap")
+
+
+SAGGING = """<mujoco><option timestep="0.0005"/><worldbody><body name="arm">
+<joint name="hinge" axis="0 -1 0"{friction}/>
+<inertial pos="0 0 -0.1" mass="0.5" diaginertia="1e-5 1e-5 1e-5"/></body></worldbody>
+<actuator><position name="servo" joint="hinge" kp="0.8"/></actuator></mujoco>"""
+
+
+@pytest.mark.slow
+def test_a_servo_that_gives_way_is_judged_as_one_although_its_damping_is_unknown(
+    tmp_path: Path,
+) -> None:
+    machine = mujoco.MjModel.from_xml_string(SAGGING.format(friction=' damping="0.06"'))
+    data, random = mujoco.MjData(machine), np.random.default_rng(7)
+    time, positions = 0.005 * np.arange(2000), np.zeros(2000)
+    goals = 1.2 * np.sin(0.15 * time**2)
+    for row, goal in enumerate(goals):
+        positions[row], data.ctrl[0] = data.qpos[0], goal
+        mujoco.mj_step(machine, data, 10)
+    model = tmp_path / "servo.xml"
+    model.write_text(SAGGING.format(friction=""))
+    noise = 5e-4 * random.standard_normal(len(time))
+    log = write_log(tmp_path / "log.csv", {"t": time, "goal": goals, "angle": positions + noise})
+    assert rigtwin.describe(model, log).reading.kind.test == "position commands"
+    answer = rigtwin.diagnose(log, machine=model)
+    assert "judged as servos" in answer.notes[0]
+    (finding,) = answer.effects
+    assert str(finding.name) == "viscous@hinge"
+    assert finding.parameters["viscous"].value == pytest.approx(0.06, rel=0.03)
+
+
+def test_a_supply_is_no_command_of_a_position(tmp_path: Path) -> None:
+    model = tmp_path / "servo.xml"
+    model.write_text(SAGGING.format(friction=' damping="0.06"'))
+    time = 0.01 * np.arange(400)
+    goal = np.sin(time)
+    log = {"t": time, "position": goal, "goal_position": goal, "input_volts": 7.0 + 0.01 * goal}
+    described = rigtwin.describe(model, write_log(tmp_path / "log.csv", log))
+    assert "a voltage" in described.reading.unused["input_volts"]

@@ -27,6 +27,8 @@ from rigtwin.recording import RecordedTest
 EARLIER = 0.7
 """Share of the nominal twin's error that commands one row earlier must leave at most to be
 tried."""
+LESS = 0.8
+"""Share of the first answer's residual that another one must leave at most."""
 DRIVE_EFFORT = 100.0
 """Most processor time spent on the servos of a machine whose forces show no gap, s."""
 PREDICTED = "the motion that the servos' commands cause shows no gap either"
@@ -52,13 +54,13 @@ class Attempt:
     data
         Recordings of the logs.
     least
-        Share of the gap that their answer must close to be given.
+        Share of the gap that their answer must close to be given; None where it must leave less.
     reason
         Why the logs are taken so, for a note.
     """
 
     data: DiagnosisData
-    least: float
+    least: float | None
     reason: str
 
 
@@ -98,9 +100,7 @@ def look_otherwise(
         )
         if other.verdict == "no gap" and _names_force_sensor(diagnosis, data.machine):
             continue
-        # Of two answers that leave a part of the gap, the one that closes more of it is given.
-        least = attempt.least if closed == 1.0 else max(attempt.least, closed)
-        if other.verdict != "unusable" and _closed_share(other) >= least:
+        if other.verdict != "unusable" and _is_better(other, diagnosis, attempt.least):
             # Of two explanations the one with fewer effects is given.
             simpler = len(other.effects) < len(diagnosis.effects)
             if simpler or closed < 1.0:
@@ -153,6 +153,20 @@ def _closed_share(diagnosis: Diagnosis) -> float:
     if diagnosis.verdict not in ("unknown", "partly explained") or diagnosis.gap is None:
         return 1.0
     return diagnosis.gap.shrinkage_held_out.value if diagnosis.effects else 0.0
+
+
+def _is_better(other: Diagnosis, first: Diagnosis, least: float | None) -> bool:
+    """Return whether another answer may take the place of the first one.
+
+    `least` is that of the attempt.
+    """
+    if least is None:
+        residuals = [each.answer.steps[-1].residual for each in (first, other)]
+        left, left_otherwise = (sum(value**2 for value in each.values()) for each in residuals)
+        return left_otherwise < LESS**2 * left
+    # Of two answers that leave a part of the gap, the one that closes more of it is given.
+    closed = _closed_share(first)
+    return _closed_share(other) >= (least if closed == 1.0 else max(least, closed))
 
 
 def _names_force_sensor(diagnosis: Diagnosis, machine: Machine) -> bool:

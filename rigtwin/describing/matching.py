@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from rigtwin.describing.heading import read_words, split_words, stated_unit
+from rigtwin.describing.heading import Meaning, read_words, split_words, stated_unit
 from rigtwin.describing.joint_names import QUANTITY_WORDS, Alias, list_aliases, read_abbreviations
 from rigtwin.describing.match import NUMBERED, REMAINING, UNNAMED, Match
 from rigtwin.describing.numbered_columns import (
@@ -83,10 +83,24 @@ def match_columns(
     if (match := _remaining(columns, leading, matches, unused)) is not None:
         matches.append(match)
         del unused[match.column]
+    used: list[Match] = []
     for match in matches:
+        unit = columns.units.get(match.column, "")
         if match.quantity is JointQuantity.OTHER:
             unused[match.column] = "no test needs this quantity"
-    return [match for match in matches if match.quantity is not JointQuantity.OTHER], unused
+        elif _is_supply(mechanism, match, read_words(headings[match.column], unit)):
+            unused[match.column] = "a voltage, and the model's actuator takes a position"
+        else:
+            used.append(match)
+    return used, unused
+
+
+def _is_supply(mechanism: Mechanism, match: Match, meaning: Meaning) -> bool:
+    """Return whether a column holds a voltage where an actuator takes a position."""
+    actuator = actuator_on(mechanism, match.joint)
+    is_command = match.quantity is JointQuantity.COMMAND and actuator is not None
+    is_voltage = meaning.quantity is JointQuantity.VOLTAGE
+    return is_command and is_voltage and mechanism.positions(actuator or "")
 
 
 def _leading(mechanism: Mechanism, joints: Sequence[str]) -> list[str]:

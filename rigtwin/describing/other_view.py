@@ -8,6 +8,9 @@ A column "tau" may hold the measured force or the commanded one. Along the motio
 that the actuator never gave is no force of any law, but it predicts the motion once the actuator's
 limit is known.
 
+Position commands of a model without damping are taken for actuators that follow them whatever the
+load. A servo that gives way to its load is seen better as a servo.
+
 A log of servos may hold their commands and their forces. Play before the position sensor, or a
 force that is sampled between two commands, contradicts inverse dynamics, but not the motion that
 the commands cause. Where the forces show no gap, the servos that give them may have one.
@@ -21,9 +24,9 @@ from rigtwin.describing.described import Described, describe_log
 from rigtwin.describing.log import STATED
 from rigtwin.describing.quantity import JointQuantity
 from rigtwin.describing.reading import Reading
-from rigtwin.describing.replay_kind import are_servos
+from rigtwin.describing.replay_kind import are_servos, may_be_servos
 from rigtwin.description.coupling import are_coupled
-from rigtwin.description.implied import FORCES, INVERSE, SERVOS
+from rigtwin.description.implied import FORCES, INVERSE, POSITIONS, SERVOS
 from rigtwin.description.joint_elements import actuator_on
 from rigtwin.description.mechanism import Mechanism
 from rigtwin.errors import RigtwinError
@@ -47,7 +50,8 @@ class OtherView:
     below
         Share of the gap below which the first answer must stay for this view to be tried.
     least
-        Share of the gap that the answer of this view must close to take the place of the first.
+        Share of the gap that the answer of this view must close to take the place of the first;
+        None where it must leave less of the same signals, as the nominal twins differ.
     reason
         Why the log is judged so, for a note.
     of_commands
@@ -56,7 +60,7 @@ class OtherView:
 
     test: str
     below: float
-    least: float
+    least: float | None
     reason: str
     of_commands: bool = False
 
@@ -97,6 +101,15 @@ VIEWS = {
             of_commands=True,
         ),
     ),
+    POSITIONS: (
+        OtherView(
+            SERVOS,
+            ENOUGH,
+            None,
+            "judged as servos that give way to their load, which leaves less of the motion; "
+            "--test position-commands judges them as actuators that do not",
+        ),
+    ),
 }
 """Kind of a test → the views in which the same log may be judged, in the order of trial."""
 DRIVES = OtherView(
@@ -134,7 +147,9 @@ def describe_otherwise(described: Described, view: OtherView) -> Described | Non
             return None
         if not are_commands and not _may_be_commands(described, mechanism):
             return None
-    if view.test == SERVOS and not are_servos(mechanism, reading.joints):
+    # The damping of a servo that gives way may be unknown; one that is pushed needs a model.
+    known = may_be_servos if reading.kind.test == POSITIONS else are_servos
+    if view.test == SERVOS and not known(mechanism, reading.joints):
         return None
     try:
         return describe_log(described.machine.model, described.log, described.stated, view.test)

@@ -214,6 +214,19 @@ def are_servos(mechanism: Mechanism, joints: Sequence[str]) -> bool:
     return placed and _position_test(mechanism, joints).test == SERVOS
 
 
+def may_be_servos(mechanism: Mechanism, joints: Sequence[str]) -> bool:
+    """Return whether the model has the gains of a servo at every joint.
+
+    Parameters
+    ----------
+    mechanism
+        The compiled MJCF or URDF.
+    joints
+        Joints that take part.
+    """
+    return all(mechanism.servo(actuator_on(mechanism, joint) or "") for joint in joints)
+
+
 def _position_test(mechanism: Mechanism, joints: Sequence[str]) -> ReplayKind:
     """Servos where the model says how they are damped; else actuators without a model inside."""
     for joint in joints:

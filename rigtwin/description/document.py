@@ -56,6 +56,9 @@ def examine(path: Path) -> tuple[Machine | None, list[str]]:
     """
     try:
         # Editors on Windows write a byte order mark, which utf-8-sig removes.
+        # A device such as /dev/zero never ends.
+        if path.is_char_device():
+            raise RigtwinError(f"{path} is a device; expected a file")
         text = path.read_text(encoding="utf-8-sig")
     except OSError as error:
         return None, [f"cannot read it: {error.strerror}"]
