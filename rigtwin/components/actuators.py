@@ -43,6 +43,11 @@ class ForceActuator(NamedTuple):
     rate_limit: Annotated[float, Quantity("unit of the command/s", 1e-9, UNLIMITED, NONE)] = (
         UNLIMITED
     )
+    # Play between motor and joint, whose position is measured.
+    backlash: Annotated[float, Quantity("m", 0.0, 100.0, NONE)] = 0.0
+    rotor_share: Annotated[float, Quantity("1", 0.005, 0.995, "0.5: as much as the joint")] = 0.5
+    rotor_friction: Annotated[float, Quantity("N", 0.0, 1e7, NONE)] = 0.0
+    play_compliance: Annotated[float, Quantity("m/N", 0.0, 1e3, NONE)] = 0.0
 
 
 class PositionActuator(NamedTuple):

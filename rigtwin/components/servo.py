@@ -14,6 +14,7 @@ for N.
 from __future__ import annotations
 
 import math
+from itertools import product
 from typing import Annotated, NamedTuple
 
 import numpy as np
@@ -106,11 +107,11 @@ class Play(NamedTuple):
 
 
 def play_of(actuator: Pusher) -> Play:
-    """Return the play between an actuator's motor and the joint; a force actuator has none."""
-    if isinstance(actuator, Servo):
-        half = 0.5 * actuator.backlash
-        return Play(half, actuator.rotor_share, actuator.rotor_friction, actuator.play_compliance)
-    return Play(0.0, 0.5, 0.0, 0.0)
+    """Return the play between an actuator's motor and the joint; a velocity servo has none."""
+    if isinstance(actuator, VelocityServo):
+        return Play(0.0, 0.5, 0.0, 0.0)
+    half = 0.5 * actuator.backlash
+    return Play(half, actuator.rotor_share, actuator.rotor_friction, actuator.play_compliance)
 
 
 class Push(NamedTuple):
@@ -214,13 +215,33 @@ def _backlash(context: Context) -> Starts:
     return Starts(values, (0.002 * stroke, 0.02, 0.01 * force, yielding))
 
 
+def _motor_backlash(context: Context) -> Starts:
+    # Nothing holds the rotor back but its inertia, whose share decides on the motion.
+    stroke, force = context.scales.stroke, context.scales.force
+    yielding = 0.001 * stroke / force
+    values = tuple(
+        (play * stroke, share, 0.0, yielding)
+        for play, share in product((0.004, 0.012, 0.04, 0.12), (0.1, 0.35, 0.7))
+    )
+    return Starts(values, (0.001 * stroke, 0.01, 0.005 * force, yielding))
+
+
+PLAY = ("backlash", "rotor_share", "rotor_friction", "play_compliance")
+"""Parameters of a play between a motor and its joint."""
 KINDS = (
     Kind(
         "backlash",
         "backlash",
-        ("backlash", "rotor_share", "rotor_friction", "play_compliance"),
+        PLAY,
         "a play between the servo's motor, whose position it controls, and the joint",
         {Servo: _backlash},
+    ),
+    Kind(
+        "backlash",
+        "backlash",
+        PLAY,
+        "a play between the motor and the joint, whose position is measured",
+        {ForceActuator: _motor_backlash},
     ),
     Kind(
         "gains",

@@ -18,7 +18,7 @@ import math
 
 import numpy as np
 
-from rigtwin.components import Effect, measures
+from rigtwin.components import Effect, ForceActuator, measures
 from rigtwin.components.quantity import fields
 from rigtwin.diagnosis.fitter import Fitter
 from rigtwin.diagnosis.scoring import Scored
@@ -42,6 +42,9 @@ resembles them."""
 ELUSIVE = ("payload",)
 """Kinds of a rigid body that are rare. A payload has a place besides its mass, so that it resembles
 the zero or the friction of several joints."""
+RARE_AT: dict[type, tuple[str, ...]] = {ForceActuator: ("backlash",)}
+"""Type of component without dry friction → kinds that are rare at it. Of a pushed joint, play takes
+four times the steps of any other effect."""
 CONTAINS_SIMPLER = ("two_lags", "mount", "deadband_asymmetry")
 """Kinds that become a simpler kind at an end of their range."""
 LATE = ("delay", "lag")
@@ -60,12 +63,12 @@ nominal value."""
 def is_rare(effect: Effect) -> bool:
     """Return whether few machines have an effect.
 
-    The gain of a sensor is rare and its zero is not. A kind of a component without dry friction is
-    never rare.
+    The gain of a sensor is rare and its zero is not. Most kinds of components without dry friction
+    are not rare.
     """
     if measures(effect.of()):
         return effect.kind.name != "offset"
-    if effect.kind.name in ELUSIVE:
+    if effect.kind.name in (*ELUSIVE, *RARE_AT.get(effect.of, ())):
         return True
     return effect.kind.name in RARE and "coulomb" in fields(effect.of)
 

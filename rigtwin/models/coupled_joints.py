@@ -21,7 +21,7 @@ from rigtwin.description.configuration import Configuration
 from rigtwin.description.machine import Machine
 from rigtwin.description.replay import ReplayOf, Row
 from rigtwin.models.bodies import inertia_at
-from rigtwin.models.forward_arrays import GuideContacts, Servos, State, allocate
+from rigtwin.models.forward_arrays import GuideContacts, Pushers, State, allocate
 from rigtwin.models.forward_motion import advance
 from rigtwin.models.initial_state import InitialState, Seen
 from rigtwin.models.joint_drives import JointDrives, recorded
@@ -216,7 +216,7 @@ class CoupledJoints:
             inputs = inputs._replace(disturbance=disturbance)
         if guide_disturbance is not None:
             inputs = inputs._replace(guide_disturbance=guide_disturbance)
-        contacts, size = drives.contacts(plant, inputs.pushes), multibody.coordinates
+        contacts, size = drives.contacts(plant), multibody.coordinates
         h = self._period / drives.steps
         # New data take longer than the simulation of a short window. Compiled code knows them by
         # their address only: this name keeps them alive.
@@ -224,11 +224,11 @@ class CoupledJoints:
         bodies = multibody.bodies(data, turning)
         # Each window writes its own ticks.
         out = np.zeros((3, size, self._ticks))
-        work = allocate(size, self._loose, len(self._layout.guides), len(self._layout.servos))
+        work = allocate(size, self._loose, len(self._layout.guides), len(self._layout.pushers))
 
         def move(start: Array, first: int, last: int, _: mujoco.MjData = data) -> Array:
             prescribed = inputs.prescribed[:, first * drives.steps :]
-            state = begin(contacts, inputs.servos, start, prescribed, self._layout.held, h)
+            state = begin(contacts, inputs.pushers, start, prescribed, self._layout.held, h)
             advance(
                 bodies=bodies,
                 contacts=contacts,
@@ -315,7 +315,7 @@ class CoupledJoints:
 
 def begin(
     contacts: GuideContacts,
-    servos: Servos,
+    pushers: Pushers,
     start: Array,
     prescribed: Array,
     held: np.ndarray,
@@ -325,8 +325,8 @@ def begin(
 
     Parameters
     ----------
-    contacts, servos
-        Guides and servos of the machine.
+    contacts, pushers
+        Guides and actuators of the machine.
     start
         Positions and velocities, m and m/s, shape (2, coordinates).
     prescribed
@@ -358,6 +358,6 @@ def begin(
         viscous=damping * rate,
         inner=position.copy(),
         within=np.zeros(len(position)),
-        rotor=servos.levers @ place + servos.zero,
-        spin=servos.levers @ speed,
+        rotor=pushers.levers @ place + pushers.zero,
+        spin=pushers.levers @ speed,
     )

@@ -36,19 +36,19 @@ class State(NamedTuple):
     viscous: Array  # Relaxing viscous force of each guide, N, shape (guides,).
     inner: Array  # Position of each guide behind its compliant mount, m, shape (guides,).
     within: Array  # Velocity of each guide behind its compliant mount, m/s, shape (guides,).
-    rotor: Array  # Position of each servo's rotor behind its play, m, shape (servos,).
-    spin: Array  # Velocity of each servo's rotor behind its play, m/s, shape (servos,).
+    rotor: Array  # Position of each motor's rotor behind its play, m, shape (pushers,).
+    spin: Array  # Velocity of each motor's rotor behind its play, m/s, shape (pushers,).
 
 
-class Servos(NamedTuple):
-    """Servos of the machine as compiled code takes them, one row for each servo."""
+class Pushers(NamedTuple):
+    """Force actuators and servos of the machine as compiled code takes them."""
 
-    laws: np.ndarray  # Each `Push`, as records, shape (servos,).
-    plays: np.ndarray  # Each `Play`, as records, shape (servos,).
-    levers: Array  # Direction of each servo in the coordinates, shape (servos, coordinates).
-    zero: Array  # Position of each servo at zero coordinates, m, shape (servos,).
-    inertia: Array  # Inertia that each servo moves, kg, shape (servos,).
-    commands: Array  # Conditioned commands at the steps, shape (servos, steps).
+    laws: np.ndarray  # Each `Push`, as records, shape (pushers,).
+    plays: np.ndarray  # Each `Play`, as records, shape (pushers,).
+    levers: Array  # Direction of each actuator in the coordinates, shape (pushers, coordinates).
+    zero: Array  # Position of each actuator at zero coordinates, m, shape (pushers,).
+    inertia: Array  # Inertia that each actuator moves, kg, shape (pushers,).
+    commands: Array  # Conditioned commands at the steps, shape (pushers, steps).
 
 
 class StepInputs(NamedTuple):
@@ -58,11 +58,9 @@ class StepInputs(NamedTuple):
     """
 
     prescribed: Array  # Prescribed positions, m, shape (coordinates, steps + 1); else zero.
-    pushes: Array  # Forces of the force actuators, N, shape (actuators, steps).
-    levers: Array  # Direction of each force actuator, shape (actuators, coordinates).
     disturbance: Array  # Unmodelled force on each coordinate, N, shape (coordinates, ticks).
     guide_disturbance: Array  # Unmodelled force on each guide, N, shape (guides, ticks).
-    servos: Servos  # Actuators whose force depends on their position.
+    pushers: Pushers  # Force actuators and servos.
 
 
 class WorkSpace(NamedTuple):
@@ -81,7 +79,7 @@ class WorkSpace(NamedTuple):
     earlier_push: Array  # Actuators' forces up to the step, N, shape (coordinates,).
     system: Array  # Matrix of the free coordinates' equation, then its Cholesky factor, kg.
     right: Array  # Right side, Ns, then the free velocities without dry friction, m/s.
-    # Servos, shape (servos,).
+    # Actuators, shape (pushers,).
     held_by: Array  # Damping, Ns/m.
     weights: Array  # Implicit share of the damping.
     turning: Array  # Velocity of the rotor where the joint stands still, m/s.
@@ -105,15 +103,15 @@ class WorkSpace(NamedTuple):
     column: Array  # One of these responses while it is solved for, shape (free,).
 
 
-def allocate(size: int, loose: int, guides: int, servos: int) -> WorkSpace:
+def allocate(size: int, loose: int, guides: int, pushers: int) -> WorkSpace:
     """Return the work space of a machine.
 
     Parameters
     ----------
     size, loose
         Numbers of all coordinates and of the free ones.
-    guides, servos
-        Numbers of guides and servos.
+    guides, pushers
+        Numbers of guides and actuators.
     """
     return WorkSpace(
         inertia=np.zeros((size, size)),
@@ -125,10 +123,10 @@ def allocate(size: int, loose: int, guides: int, servos: int) -> WorkSpace:
         earlier_push=np.zeros(size),
         system=np.zeros((loose, loose)),
         right=np.zeros(loose),
-        held_by=np.zeros(servos),
-        weights=np.zeros(servos),
-        turning=np.zeros(servos),
-        dragged=np.zeros(servos),
+        held_by=np.zeros(pushers),
+        weights=np.zeros(pushers),
+        turning=np.zeros(pushers),
+        dragged=np.zeros(pushers),
         place=np.zeros(guides),
         rate=np.zeros(guides),
         guide_force=np.zeros(guides),

@@ -181,12 +181,7 @@ class ForwardDynamicsModel(CoupledJoints, Model[Plant]):
         position, speed = along @ moved[0], along @ moved[1]
         if component in self._layout.pushers:
             # The joints' force is that of all actuators together: take this actuator's alone.
-            pushed = self._drives.push_forces(plant)[
-                self._layout.pushers.index(component), :: self._steps
-            ]
-            return position, speed, pushed
-        if component in self._layout.servos:
-            law = self._layout.servo_law(plant, component)
+            law = self._layout.push_law(plant, component)
             command = self._drives.condition(plant, [component])[0, :: self._steps]
             at = position + self._layout.zero[component]
             passed = [push(law, *each) for each in zip(command, at, speed, strict=True)]
@@ -204,7 +199,7 @@ class ForwardDynamicsModel(CoupledJoints, Model[Plant]):
         signal, role = force, "guide"
         if component in names:
             signal, role = self.predict(plant)[names.index(component)], "sensor"
-        elif component in (*self._layout.pushers, *self._layout.servos):
+        elif component in self._layout.pushers:
             role = "force"
         elif component in self._layout.leaders:
             signal, role = position, "position"

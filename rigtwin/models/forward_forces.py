@@ -10,43 +10,35 @@ from rigtwin.components.guide_force import damping, position_force, quick_dampin
 from rigtwin.components.guide_step import GuideStep
 from rigtwin.components.mount import MountState, give_way
 from rigtwin.components.servo import pull, push
-from rigtwin.models.forward_arrays import GuideContacts, Servos, State, StepInputs, WorkSpace
+from rigtwin.models.forward_arrays import GuideContacts, Pushers, State, StepInputs, WorkSpace
 from rigtwin.models.forward_play import press
 from rigtwin.models.joint_motion import SHORTEST
 from rigtwin.numerics.compiling import part_kernel
 
 
 @part_kernel
-def push_coordinates(inputs: StepInputs, number: int, work: WorkSpace) -> None:
-    """Add up the force actuators' forces over step `number`, and those up to it."""
-    # The sensors at this step see the force of the command held before it; the step from here is
-    # driven by the mean of both.
-    for a in range(len(inputs.levers)):
-        earlier = inputs.pushes[a, max(number - 1, 0)]
-        now = 0.5 * (earlier + inputs.pushes[a, number])
-        for i in range(len(work.pushed)):
-            work.pushed[i] += inputs.levers[a, i] * now
-            work.transmitted[i] += inputs.levers[a, i] * now
-            work.earlier_push[i] += inputs.levers[a, i] * earlier
+def push_coordinates(
+    pushers: Pushers, state: State, number: int, h: float, work: WorkSpace
+) -> None:
+    """Add the actuators' forces over step `number`, but for the implicit share of their damping.
 
-
-@part_kernel
-def serve(servos: Servos, state: State, number: int, h: float, work: WorkSpace) -> None:
-    """Add the servos' forces over step `number`, but for the implicit share of their damping."""
+    The sensors at this step see the force of the command held before it; the step from here is
+    driven by the mean of both commands.
+    """
     size = len(work.pushed)
-    for a in range(len(servos.laws)):
-        law = servos.laws[a]
-        position_at, rate_mid, rate_now = servos.zero[a], 0.0, 0.0
+    for a in range(len(pushers.laws)):
+        law = pushers.laws[a]
+        position_at, rate_mid, rate_now = pushers.zero[a], 0.0, 0.0
         for i in range(size):
-            position_at += servos.levers[a, i] * state.place[i]
-            rate_mid += servos.levers[a, i] * work.midspeed[i]
-            rate_now += servos.levers[a, i] * state.speed[i]
-        play, at, turning = servos.plays[a], position_at, rate_now
+            position_at += pushers.levers[a, i] * state.place[i]
+            rate_mid += pushers.levers[a, i] * work.midspeed[i]
+            rate_now += pushers.levers[a, i] * state.speed[i]
+        play, at, turning = pushers.plays[a], position_at, rate_now
         if play.half > 0.0:
-            # The servo controls its rotor, which a play separates from the joint.
+            # The motor moves its rotor, which a play separates from the joint.
             at, rate_mid, turning = state.rotor[a], state.spin[a], state.spin[a]
-        earlier = servos.commands[a, max(number - 1, 0)]
-        now = 0.5 * (earlier + servos.commands[a, number])
+        earlier = pushers.commands[a, max(number - 1, 0)]
+        now = 0.5 * (earlier + pushers.commands[a, number])
         force, held_by = pull(law, now, at), law.damping_gain
         if abs(force - held_by * turning) > law.limit:
             # At its limit a servo damps nothing.
@@ -54,7 +46,7 @@ def serve(servos: Servos, state: State, number: int, h: float, work: WorkSpace) 
             held_by = 0.0
         before = push(law, earlier, at, rate_mid)
         # Midpoint rule, or more implicit where the damping would make that oscillate.
-        weight, mass = 0.5, servos.inertia[a]
+        weight, mass = 0.5, pushers.inertia[a]
         if play.half > 0.0:
             force, held_by = press(
                 play, mass, a, position_at, rate_now, force, held_by, h, state, work
@@ -66,9 +58,9 @@ def serve(servos: Servos, state: State, number: int, h: float, work: WorkSpace) 
         work.held_by[a], work.weights[a] = held_by, weight
         whole = force - weight * held_by * rate_now
         for i in range(size):
-            work.pushed[i] += servos.levers[a, i] * force
-            work.transmitted[i] += servos.levers[a, i] * whole
-            work.earlier_push[i] += servos.levers[a, i] * before
+            work.pushed[i] += pushers.levers[a, i] * force
+            work.transmitted[i] += pushers.levers[a, i] * whole
+            work.earlier_push[i] += pushers.levers[a, i] * before
 
 
 @part_kernel

@@ -23,8 +23,8 @@ from rigtwin.components.dry_friction import slide
 from rigtwin.components.guide_force import damping
 from rigtwin.models.bodies import Bodies, find_terms
 from rigtwin.models.coupled_friction import rub
-from rigtwin.models.forward_arrays import GuideContacts, Servos, State, StepInputs, WorkSpace
-from rigtwin.models.forward_forces import push_coordinates, resist_explicitly, serve
+from rigtwin.models.forward_arrays import GuideContacts, Pushers, State, StepInputs, WorkSpace
+from rigtwin.models.forward_forces import push_coordinates, resist_explicitly
 from rigtwin.models.forward_play import turn_rotors
 from rigtwin.numerics.arrays import Array
 from rigtwin.numerics.cholesky import factor, solve
@@ -34,13 +34,13 @@ from rigtwin.numerics.compiling import loop_kernel, part_kernel
 @part_kernel
 def assemble(
     contacts: GuideContacts,
-    servos: Servos,
+    pushers: Pushers,
     free: np.ndarray,
     held: np.ndarray,
     h: float,
     work: WorkSpace,
 ) -> None:
-    """Add the damping of guides and servos to the linear system of the free coordinates.
+    """Add the damping of guides and actuators to the linear system of the free coordinates.
 
     A damper d along a, with the implicit share w, adds h·w·d·a_f·a_fᵀ to the matrix. On the right
     side it leaves −h·w·d·a_f·(a_p·v_p⁺), with the known velocities v_p⁺ of prescribed coordinates.
@@ -60,15 +60,15 @@ def assemble(
             for b in range(loose):
                 work.system[a, b] += h * weight * along * contacts.along[g, free[b]]
         work.unrubbed[g] = prescribed
-    for g in range(len(servos.laws)):
+    for g in range(len(pushers.laws)):
         weight, prescribed = work.weights[g] * work.held_by[g], 0.0
         for k in range(len(held)):
-            prescribed += servos.levers[g, held[k]] * work.ahead_speed[held[k]]
+            prescribed += pushers.levers[g, held[k]] * work.ahead_speed[held[k]]
         for a in range(loose):
-            along = servos.levers[g, free[a]]
+            along = pushers.levers[g, free[a]]
             work.right[a] -= h * along * weight * prescribed
             for b in range(loose):
-                work.system[a, b] += h * weight * along * servos.levers[g, free[b]]
+                work.system[a, b] += h * weight * along * pushers.levers[g, free[b]]
 
 
 @part_kernel
@@ -81,7 +81,7 @@ def accelerate(
     h: float,
     work: WorkSpace,
 ) -> None:
-    """Write the linear system of the free coordinates f without guides' and servos' damping.
+    """Write the undamped linear system of the free coordinates f.
 
     M_ff·v⁺ = M_ff·v − M_fp·(v_p⁺ − v_p) + h·(forces − bias), with the prescribed coordinates p.
     """
@@ -133,17 +133,17 @@ def required_force(
     work: WorkSpace,
 ) -> float:
     """Return the force that the prescribed coordinate `i` requires, N, by inverse dynamics."""
-    size, servos = len(work.pushed), inputs.servos
+    size, pushers = len(work.pushed), inputs.pushers
     force = work.bias[i] - inputs.disturbance[i, tick]
     for j in range(size):
         force += work.inertia[i, j] * (work.ahead_speed[j] - state.speed[j]) / h
     for g in range(len(contacts.springs)):
         force -= contacts.along[g, i] * work.guide_force[g]
-    for g in range(len(servos.laws)):
+    for g in range(len(pushers.laws)):
         ahead = 0.0
         for j in range(size):
-            ahead += servos.levers[g, j] * work.ahead_speed[j]
-        force += servos.levers[g, i] * work.weights[g] * work.held_by[g] * ahead
+            ahead += pushers.levers[g, j] * work.ahead_speed[j]
+        force += pushers.levers[g, i] * work.weights[g] * work.held_by[g] * ahead
     return force - work.pushed[i]
 
 
@@ -199,8 +199,7 @@ def advance(
                 work.pushed[i] = work.transmitted[i] = work.earlier_push[i] = 0.0
             # M(q) and c(q, q'), by MuJoCo where they change with the state.
             find_terms(bodies, state.place, work.midspeed, work.inertia, work.bias)
-            push_coordinates(inputs, number, work)
-            serve(inputs.servos, state, number, h, work)
+            push_coordinates(inputs.pushers, state, number, h, work)
             if step == 0:
                 for i in range(size):
                     out[0, i, tick], out[1, i, tick] = state.place[i], state.speed[i]
@@ -211,7 +210,7 @@ def advance(
                 work.ahead_speed[held[k]] = moved / h
             resist_explicitly(contacts, inputs, state, tick, h, work)
             accelerate(inputs, free, held, state, tick, h, work)
-            assemble(contacts, inputs.servos, free, held, h, work)
+            assemble(contacts, inputs.pushers, free, held, h, work)
             # The matrix is symmetric and positive definite: an inertia matrix, with damping added.
             factor(work.system, loose)
             solve(work.system, loose, work.right)
@@ -220,7 +219,7 @@ def advance(
             for a in range(loose):
                 work.ahead_speed[free[a]] = work.right[a]
             update_guides(contacts, state, h, work)
-            turn_rotors(inputs.servos, state, h, work)
+            turn_rotors(inputs.pushers, state, h, work)
             if step == 0:
                 for k in range(len(held)):
                     # Inverse dynamics, once per tick, as sensors are read at ticks alone.

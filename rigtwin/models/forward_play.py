@@ -1,4 +1,4 @@
-"""Play between the motor of a servo and a joint that is coupled to others. Compiled.
+"""Play between a motor and a joint that is coupled to others. Compiled.
 
 The law is that of a single joint (`joint_step`): rotor and joint are two masses whose distance is
 free within ± half the play. Beyond it, by a length b, the contact's force is b/s + c·db/dt, with
@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 
 from rigtwin.components.servo import Play
-from rigtwin.models.forward_arrays import Servos, State, WorkSpace
+from rigtwin.models.forward_arrays import Pushers, State, WorkSpace
 from rigtwin.models.joint_step import CONTACT_DAMPING, shrink
 from rigtwin.numerics.compiling import part_kernel
 
@@ -82,11 +82,11 @@ def press(
 
 
 @part_kernel
-def turn_rotors(servos: Servos, state: State, h: float, work: WorkSpace) -> None:
+def turn_rotors(pushers: Pushers, state: State, h: float, work: WorkSpace) -> None:
     """Move the rotors behind a play, at the new velocities of the joints."""
-    for a in range(len(servos.laws)):
+    for a in range(len(pushers.laws)):
         ahead = 0.0
         for i in range(len(work.ahead_speed)):
-            ahead += servos.levers[a, i] * work.ahead_speed[i]
+            ahead += pushers.levers[a, i] * work.ahead_speed[i]
         state.spin[a] = work.turning[a] + work.dragged[a] * ahead
         state.rotor[a] += h * state.spin[a]

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rigtwin.components import SERVOS, UNLIMITED, Mass, component_of
+from rigtwin.components import Mass, component_of
 from rigtwin.components.conditioning import actuator
 from rigtwin.components.plant import Plant
 from rigtwin.components.sensors import apply_sensor, sensor_of
@@ -61,7 +61,7 @@ class ForwardDynamicsTwin(CoupledJoints):
         h = self._period / drives.steps
         multibody = self._bodies_of(plant)
         inputs = drives.collect(plant, {})
-        contacts = drives.contacts(plant, inputs.pushes)
+        contacts = drives.contacts(plant)
         data = multibody.data()
         return SteppedTwin(
             bodies=multibody.bodies(data, drives.turning(plant)),
@@ -71,14 +71,14 @@ class ForwardDynamicsTwin(CoupledJoints):
             held=self._layout.held,
             state=begin(
                 contacts,
-                inputs.servos,
+                inputs.pushers,
                 self._starts_of(plant)[0],
                 inputs.prescribed,
                 self._layout.held,
                 h,
             ),
             inputs=inputs,
-            laws=[self._layout.servo_law(plant, name) for name in self._layout.servos],
+            laws=[self._layout.push_law(plant, name) for name in self._layout.pushers],
             drives=[self._drive(plant, name, h) for name in outputs],
             sensing=[
                 IdealSensor(r, self._layout.along[r.name], self._layout.zero[r.name])
@@ -124,14 +124,8 @@ class ForwardDynamicsTwin(CoupledJoints):
         return out, commands
 
     def _drive(self, plant: Plant, name: str, h: float) -> SteppedActuator:
-        mover = pusher_of(plant, name)
-        model = actuator(mover, plant.computer, h)
-        if isinstance(mover, SERVOS):
-            return SteppedActuator(model, 1.0, UNLIMITED, True, self._layout.servos.index(name))
-        limit = self._drives.force_limit(plant, name)
-        return SteppedActuator(
-            model, mover.constant, limit, False, self._layout.pushers.index(name)
-        )
+        model = actuator(pusher_of(plant, name), plant.computer, h)
+        return SteppedActuator(model, self._layout.pushers.index(name))
 
     def list_sensors(self) -> list[Row]:
         """Return the sensors of the joints and the quantity that each reads."""

@@ -23,7 +23,7 @@ from rigtwin.components.sensors import sensor_of
 from rigtwin.components.servo import Play, Push, play_of, pusher_of
 from rigtwin.description.machine import Machine
 from rigtwin.models.following import follow_command
-from rigtwin.models.forward_arrays import GuideContacts, Servos, StepInputs
+from rigtwin.models.forward_arrays import GuideContacts, Pushers, StepInputs
 from rigtwin.models.joint_layout import JointLayout
 from rigtwin.models.joint_motion import RIGID
 from rigtwin.models.joint_simulation import CONTACT_STEPS
@@ -130,24 +130,22 @@ class JointDrives:
             )
         return commands
 
-    def push_forces(self, plant: Plant) -> Array:
-        """Return the forces of the force actuators at the steps, N, shape (actuators, steps)."""
-        forces = self.condition(plant, self._layout.pushers)
-        for number, name in enumerate(self._layout.pushers):
-            mover = component_of(plant, name, ForceActuator)
-            limit = self.force_limit(plant, name)
-            forces[number] = np.clip(mover.constant * forces[number], -limit, limit)
-        return forces
+    def load(self, plant: Plant) -> float:
+        """Return the rms force of all force actuators together, N."""
+        forces = []
+        for name in self._layout.pushers:
+            mover = pusher_of(plant, name)
+            if isinstance(mover, ForceActuator):
+                limit = min(mover.force_limit, UNLIMITED)
+                command = self.condition(plant, [name])[0]
+                forces.append(np.clip(mover.constant * command, -limit, limit))
+        return float(np.sqrt(np.mean(np.square(forces)))) if forces else 0.0
 
-    def force_limit(self, plant: Plant, name: str) -> float:
-        """Return the force limit of a force actuator, N."""
-        return min(pusher_of(plant, name).force_limit, UNLIMITED)
-
-    def serve(self, plant: Plant) -> Servos:
-        """Return the servos with their conditioned commands at the steps."""
-        names = self._layout.servos
-        laws = [self._layout.servo_law(plant, name) for name in names]
-        return Servos(
+    def serve(self, plant: Plant) -> Pushers:
+        """Return the actuators with their conditioned commands at the steps."""
+        names = self._layout.pushers
+        laws = [self._layout.push_law(plant, name) for name in names]
+        return Pushers(
             laws=to_records(Push, laws),
             plays=to_records(Play, [play_of(pusher_of(plant, name)) for name in names]),
             levers=self._layout.directions(names),
@@ -161,21 +159,18 @@ class JointDrives:
 
         `shifts` displace measured motions, as in `prescribe`.
         """
-        layout = self._layout
         return StepInputs(
             prescribed=self.prescribe(plant, shifts),
-            pushes=self.push_forces(plant),
-            levers=layout.directions(layout.pushers),
             disturbance=self._undisturbed[0],
             guide_disturbance=self._undisturbed[1],
-            servos=self.serve(plant),
+            pushers=self.serve(plant),
         )
 
-    def contacts(self, plant: Plant, forces: Array) -> GuideContacts:
+    def contacts(self, plant: Plant) -> GuideContacts:
         """Return the guides as compiled code takes them.
 
-        `forces` are those of the force actuators, N, shape (actuators, steps). They give the load
-        by which the friction of a prescribed joint is sized.
+        The forces of the actuators give the load by which the friction of a prescribed joint is
+        sized.
         """
         layout = self._layout
         # Rigid dry friction has no spring of its own. A numerical one is as stiff as the step
@@ -197,8 +192,7 @@ class JointDrives:
             # A fully prescribed guide must not see its friction jump with the sensor's noise: its
             # spring builds the friction up over the error of the measured motion.
             if not layout.along[name][layout.free].any():
-                load = float(np.sqrt(np.mean(forces**2))) if forces.size else 0.0
-                size = max(friction_size(dry[number], load), 1e-300)
+                size = max(friction_size(dry[number], self.load(plant)), 1e-300)
                 errors = np.array(
                     [self._read[n][1] if n in self._read else 0.0 for n in layout.leaders]
                 )
@@ -233,9 +227,9 @@ class JointDrives:
         return matrix
 
     def _rotors(self, plant: Plant) -> list[tuple[Array, float]]:
-        """Return direction and inertia of each servo's rotor that is behind a play."""
-        directions = [self._layout.along[name] for name in self._layout.servos]
-        plays = [play_of(pusher_of(plant, name)) for name in self._layout.servos]
+        """Return direction and inertia of each motor's rotor that is behind a play."""
+        directions = [self._layout.along[name] for name in self._layout.pushers]
+        plays = [play_of(pusher_of(plant, name)) for name in self._layout.pushers]
         return [
             (along, play.rotor_share * self.inertia_along(along))
             for along, play in zip(directions, plays, strict=True)

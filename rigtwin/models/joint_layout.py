@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from rigtwin.components import SERVOS, Base, Body, ForceActuator, Guide, Rotor, component_of
+from rigtwin.components import PUSHERS, Base, Body, Guide, Rotor, component_of
 from rigtwin.components.body import list_parameters, list_surplus, turn_gravity
 from rigtwin.components.plant import Plant, select
 from rigtwin.components.sensors import sensor_of
@@ -30,8 +30,8 @@ class JointLayout:
 
     Attributes
     ----------
-    pushers, servos, leaders : list of str
-        Force actuators, servos, and the components that prescribe motion.
+    pushers, leaders : list of str
+        Force actuators and servos, and the components that prescribe motion.
     guides, rotors : list of str
         Guides and rotors that some coordinate moves.
     bodies : Multibody
@@ -49,9 +49,8 @@ class JointLayout:
     def __init__(self, machine: Machine, replay: ReplayOf) -> None:
         components = machine.components
         movers = [(name, components[name].component_type) for name in replay.moved_by]
-        self.pushers = [name for name, of in movers if of is ForceActuator]
-        self.servos = [name for name, of in movers if of in SERVOS]
-        self.leaders = [n for n in replay.moved_by if n not in (*self.pushers, *self.servos)]
+        self.pushers = [name for name, of in movers if of in PUSHERS]
+        self.leaders = [name for name in replay.moved_by if name not in self.pushers]
         joints = [*replay.free, *(components[name].joint for name in self.leaders)]
         guides, rotors = machine.components_of(Guide), machine.components_of(Rotor)
         self.bodies = Multibody(machine.model, joints, guides, rotors)
@@ -61,7 +60,7 @@ class JointLayout:
         self.rotors = [rotor.name for rotor in rotors if self.along[rotor.name].any()]
         self.free = np.arange(len(replay.free))
         self.held = np.arange(len(replay.free), len(joints))
-        self.encoders = {name: self._encoder_of(components, name) for name in self.servos}
+        self.encoders = {name: self._encoder_of(components, name) for name in self.pushers}
         self._heavy = {body.name: body.mjcf for body in machine.components_of(Body)}
         self._base = next((base.name for base in machine.components_of(Base)), None)
         self._changed: Memo[Multibody] = Memo(KEPT)
@@ -78,11 +77,11 @@ class JointLayout:
             None,
         )
 
-    def servo_law(self, plant: Plant, servo: str) -> Push:
-        """Return the law of a servo, whose encoder is the one in the log, with the same error."""
-        encoder = self.encoders[servo]
+    def push_law(self, plant: Plant, pusher: str) -> Push:
+        """Return the law of an actuator; a servo's encoder is the one in the log with its error."""
+        encoder = self.encoders[pusher]
         zero = 0.0 if encoder is None else sensor_of(plant, encoder).offset
-        return push_law(pusher_of(plant, servo), zero)
+        return push_law(pusher_of(plant, pusher), zero)
 
     @property
     def inertial(self) -> tuple[str, ...]:

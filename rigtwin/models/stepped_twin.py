@@ -24,20 +24,11 @@ class SteppedActuator:
     ----------
     model : Actuator
         Conditioning of the command.
-    factor : float
-        Force per unit of conditioned command, N per unit; 1 for a servo.
-    limit : float
-        Limit of the force, N; unlimited for a servo, whose law has a limit of its own.
-    servo : bool
-        Whether the actuator is a servo rather than a force actuator.
     number : int
-        Index among the servos or among the force actuators.
+        Index among the machine's actuators.
     """
 
     model: Actuator
-    factor: float
-    limit: float
-    servo: bool
     number: int
 
 
@@ -78,7 +69,7 @@ class SteppedTwin:
     inputs
         Inputs of the whole test. The commands of `drives` in it are ignored.
     laws
-        Laws of the servos.
+        Laws of the actuators.
     drives
         Actuators that are commanded tick by tick.
     sensing
@@ -114,16 +105,14 @@ class SteppedTwin:
         # its command with the one before it, and looks no further back.
         self._window = inputs._replace(
             prescribed=np.zeros((size, two + 1)),
-            pushes=np.zeros((len(inputs.pushes), two)),
             disturbance=np.zeros((size, 2)),
             guide_disturbance=np.zeros((len(inputs.guide_disturbance), 2)),
-            servos=inputs.servos._replace(commands=np.zeros((len(inputs.servos.laws), two))),
+            pushers=inputs.pushers._replace(commands=np.zeros((len(inputs.pushers.laws), two))),
         )
         self._out = np.zeros((3, size, 2))
         self._work = allocate(size, len(free), len(contacts.springs), len(self._laws))
         # Where nothing but commands moves the machine, no input needs to be looked up.
-        movers = len(inputs.pushes) + len(inputs.servos.laws)
-        self._foretold = len(held) > 0 or movers > len(self._drives)
+        self._foretold = len(held) > 0 or len(inputs.pushers.laws) > len(self._drives)
 
     def sense(self) -> dict[str, float]:
         """Return the readings of ideal sensors before the coming tick, by name.
@@ -146,16 +135,16 @@ class SteppedTwin:
     def _find_push(self) -> Array:
         """Return the actuators' force on each coordinate, N, shape (coordinates,)."""
         window, last = self._window, 2 * self._steps - 1
-        forces = window.levers.T @ window.pushes[:, last]
+        forces = np.zeros(len(self._state.place))
         midspeed = self._state.speed + 0.5 * (self._state.speed - self._state.before)
-        servos = window.servos
+        pushers = window.pushers
         for number, law in enumerate(self._laws):
-            lever = servos.levers[number]
-            at = float(lever @ self._state.place) + float(servos.zero[number])
+            lever = pushers.levers[number]
+            at = float(lever @ self._state.place) + float(pushers.zero[number])
             rate = float(lever @ midspeed)
-            if servos.plays[number]["half"] > 0.0:
+            if pushers.plays[number]["half"] > 0.0:
                 at, rate = self._state.rotor[number], self._state.spin[number]
-            forces += lever * push(law, servos.commands[number, last], at, rate)
+            forces += lever * push(law, pushers.commands[number, last], at, rate)
         return forces
 
     def step(self, commands: Sequence[float]) -> Array:
@@ -172,26 +161,22 @@ class SteppedTwin:
             Positions, velocities and forces at the beginning of the tick, shape (3, coordinates).
         """
         window, steps = self._window, self._steps
-        servos = window.servos.commands
+        signals = window.pushers.commands
         if not self._states:
             self._states = [
                 hold(drive.model, command)
                 for drive, command in zip(self._drives, commands, strict=True)
             ]
         # Of the tick before, the kernel looks at the last step alone.
-        window.pushes[:, steps - 1] = window.pushes[:, -1]
-        servos[:, steps - 1] = servos[:, -1]
+        signals[:, steps - 1] = signals[:, -1]
         if self._foretold:
             self._look_up()
         for drive, state, command in zip(self._drives, self._states, commands, strict=True):
-            signal = (servos if drive.servo else window.pushes)[drive.number]
             for step in range(steps, 2 * steps):
-                pushed = drive.factor * condition(drive.model, state, command)
-                signal[step] = min(max(pushed, -drive.limit), drive.limit)
+                signals[drive.number, step] = condition(drive.model, state, command)
         # Before the first tick the actuators held its first command.
         if self.tick == 0:
-            window.pushes[:, steps - 1] = window.pushes[:, steps]
-            servos[:, steps - 1] = servos[:, steps]
+            signals[:, steps - 1] = signals[:, steps]
         advance(
             bodies=self._bodies,
             contacts=self._contacts,
@@ -214,5 +199,4 @@ class SteppedTwin:
         steps, known, window = self._steps, self._inputs, self._window
         first, last = self.tick * steps, (self.tick + 1) * steps
         window.prescribed[:, steps:] = known.prescribed[:, first : last + 1]
-        window.pushes[:, steps:] = known.pushes[:, first:last]
-        window.servos.commands[:, steps:] = known.servos.commands[:, first:last]
+        window.pushers.commands[:, steps:] = known.pushers.commands[:, first:last]
