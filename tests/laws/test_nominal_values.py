@@ -58,6 +58,7 @@ NOMINAL: dict[type, dict[str, float]] = {
         "gain": 1.0,
         "saturation": NO_LIMIT,
         "rate_limit": NO_LIMIT,
+        "rotor_share": 0.5,
         **RANGE,
     },
     ForceSensor: {"gain": 1.0},

@@ -1,4 +1,4 @@
-"""Play between a servo's motor and the joint, beside the same play as a limited joint of MuJoCo."""
+"""Play between a motor and its joint, beside the same play as a limited joint of MuJoCo."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from rigtwin.components import Guide, Servo
+from rigtwin.components import ForceActuator, Guide, Servo
 from rigtwin.numerics.arrays import Array
 from tests.laws.joints import INTERPRETED, PERIOD, motion_under
 from tests.laws.written import law_of
@@ -136,3 +136,31 @@ def test_a_load_winds_the_gear_up_by_its_compliance() -> None:
     position = motion_under(Guide(offset=load), np.zeros(3000), INERTIA, servo, steps=8)[0]
     wound = 0.5 * PLAY + 0.01 * load
     assert abs(position[-1]) == pytest.approx(load / GAIN + wound, rel=1e-3)
+
+
+@law_of("backlash", ForceActuator)
+@pytest.mark.parametrize("share", [0.2, 0.6])
+def test_a_motor_moves_its_joint_through_a_play_as_two_masses(share: float) -> None:
+    torque, compliance, stiffness, damping = 2.0 * commanded(700), 0.002, 5.0, 0.05
+    rotor, link = share * INERTIA, (1.0 - share) * INERTIA
+    impact = 2.0 * 0.25 * np.sqrt(rotor * link / INERTIA / compliance)
+    h, true = 1e-5, np.empty(len(torque))
+    position, speed, angle, rate = 0.0, 0.0, 0.0, 0.0
+    for tick, value in enumerate(torque):
+        true[tick] = angle
+        for _ in range(round(PERIOD / h)):
+            wound = position - angle
+            beyond, side = abs(wound) - 0.5 * PLAY, 1.0 if wound > 0.0 else -1.0
+            contact = beyond / compliance + impact * side * (speed - rate)
+            contact = side * max(contact, 0.0) if beyond > 0.0 else 0.0
+            speed += h * (value - contact) / rotor
+            rate += h * (contact - stiffness * angle - damping * rate) / link
+            position, angle = position + h * speed, angle + h * rate
+    motor = ForceActuator(backlash=PLAY, rotor_share=share, play_compliance=compliance)
+    guide = Guide(stiffness=stiffness, viscous=damping)
+    moved, rigid = (
+        motion_under(guide, torque, INERTIA, each, steps=32)[0]
+        for each in (motor, motor._replace(backlash=0.0))
+    )
+    assert np.std(moved - true) < 0.05 * np.std(true)
+    assert np.std(moved - true) < 0.2 * np.std(rigid - true)
