@@ -30,6 +30,7 @@ from rigtwin.components.sensors import (
 )
 from rigtwin.components.servo import PUSHERS, SERVOS, Pusher, Servo, VelocityServo
 from rigtwin.components.tyre import Tyre
+from rigtwin.components.warming import Warming
 
 __all__ = [
     "KINDS",
@@ -68,6 +69,7 @@ __all__ = [
     "Tyre",
     "VelocitySensor",
     "VelocityServo",
+    "Warming",
     "candidates",
     "component_of",
     "find",

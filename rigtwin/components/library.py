@@ -21,6 +21,7 @@ from rigtwin.components import (
     servo,
     signal_effects,
     tyre,
+    warming,
 )
 from rigtwin.components.effect import Effect, Kind
 from rigtwin.components.plant import Plant
@@ -37,6 +38,7 @@ MODULES = (
     signal_effects,
     servo,
     schedule,
+    warming,
     computer,
 )
 """Modules that define kinds of effect, in the order in which effects are listed."""

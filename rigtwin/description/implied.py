@@ -237,6 +237,8 @@ def _add_forces(
     forces = [sensor_name(mechanism, joint, "force") for joint in joints]
     for joint, name in zip(joints, forces, strict=True):
         tables[name] = sensor_table(mechanism, joint, "force")
+        # No machine is warm from the first moment on.
+        tables[f"{identifier(joint)}_warming"] = {"joint": joint, "type": "warming"}
     if len(joints) == 1:
         add_mass(mechanism, joints[0], tables)
         return forces

@@ -124,10 +124,10 @@ def _dissipation(model: mujoco.MjModel, components: Mapping[str, Component]) -> 
 
 def _limits(model: mujoco.MjModel, moved: set[str]) -> Iterator[str]:
     """Yield limits of tendons, and those of the actuators' forces that no actuator can have."""
-    for number in np.flatnonzero(model.tendon_limited):
+    for number in map(int, np.flatnonzero(model.tendon_limited)):
         yield f"tendon {_name(model, mujoco.mjtObj.mjOBJ_TENDON, number)}: the limits of its length"
     pushed = model.actuator_trnid[model.actuator_trntype == mujoco.mjtTrn.mjTRN_JOINT, 0]
-    for number in np.flatnonzero(model.jnt_actfrclimited):
+    for number in map(int, np.flatnonzero(model.jnt_actfrclimited)):
         name, (low, high) = (
             _name(model, mujoco.mjtObj.mjOBJ_JOINT, number),
             model.jnt_actfrcrange[number],
@@ -164,7 +164,7 @@ def _constraints(model: mujoco.MjModel, followed: set[int]) -> Iterator[str]:
     touching = np.count_nonzero((model.geom_contype != 0) | (model.geom_conaffinity != 0))
     if touching > 1 or model.npair:
         yield "contacts between its geoms"
-    for number in sorted(set(np.flatnonzero(model.eq_active0)) - followed):
+    for number in sorted(set(map(int, np.flatnonzero(model.eq_active0))) - followed):
         yield f"equality {_name(model, mujoco.mjtObj.mjOBJ_EQUALITY, number)}"
     if model.nflex:
         yield "flexible bodies"

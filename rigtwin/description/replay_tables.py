@@ -204,10 +204,10 @@ class Replays:
             if components.types[mover] in SENSED
         }
         for name, kind in components.types.items():
-            if kind == "schedule" and components.by_name[name].joint not in measured:
+            if kind in ("schedule", "warming") and components.by_name[name].joint not in measured:
                 self._mistakes.note(
                     f"[components.{name}]",
-                    "type 'schedule' goes with a joint that moves as measured; expected a replay "
+                    f"type {kind!r} goes with a joint that moves as measured; expected a replay "
                     f"of joint {components.by_name[name].joint} that is moved_by a sensor",
                 )
 

@@ -18,7 +18,7 @@ import math
 
 import numpy as np
 
-from rigtwin.components import Effect, ForceActuator, measures
+from rigtwin.components import Effect, ForceActuator, Warming, measures
 from rigtwin.components.quantity import fields
 from rigtwin.diagnosis.fitter import Fitter
 from rigtwin.diagnosis.scoring import Scored
@@ -42,7 +42,10 @@ resembles them."""
 ELUSIVE = ("payload",)
 """Kinds of a rigid body that are rare. A payload has a place besides its mass, so that it resembles
 the zero or the friction of several joints."""
-RARE_AT: dict[type, tuple[str, ...]] = {ForceActuator: ("backlash",)}
+RARE_AT: dict[type, tuple[str, ...]] = {
+    ForceActuator: ("backlash",),
+    Warming: ("coulomb", "viscous"),
+}
 """Type of component without dry friction → kinds that are rare at it. Of a pushed joint, play takes
 four times the steps of any other effect."""
 CONTAINS_SIMPLER = ("two_lags", "mount", "deadband_asymmetry")

@@ -59,8 +59,11 @@ def start_rescaled(plant: Plant, leader: Fit, candidates: Sequence[Effect]) -> l
     list of pairs
         Effects, and the values from which they are fitted.
     """
+    # A friction that fades has the name of a coefficient, but a time besides.
     nominal = {
-        effect: _magnitude(effect, plant) for effect in candidates if effect.kind.name in SCALED
+        effect: _magnitude(effect, plant)
+        for effect in candidates
+        if effect.kind.name in SCALED and len(effect.kind.parameters) == 1
     }
     fitted = _coefficients_of(leader, nominal)
     others = [

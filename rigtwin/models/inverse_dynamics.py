@@ -19,7 +19,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from rigtwin.components import Base, Body, Guide, Rotor, Schedule
+from rigtwin.components import Base, Body, Guide, Rotor, Schedule, Warming
 from rigtwin.components.body import list_surplus
 from rigtwin.components.guide import acts
 from rigtwin.components.guide_step import guide_step_of
@@ -97,7 +97,7 @@ class InverseDynamicsModel(Model[Plant]):
             components[row.name].joint: number for number, row in enumerate(replay.rows)
         }
         guides, rotors = machine.components_of(Guide), machine.components_of(Rotor)
-        schedules = machine.components_of(Schedule)
+        schedules, warming = machine.components_of(Schedule), machine.components_of(Warming)
         self._bodies = RigidBodies(machine.model, joints, guides, rotors)
         self._rests = {guide.name: self._bodies.rest_of(guide) for guide in guides}
         self._heavy = {body.name: body.mjcf for body in machine.components_of(Body)}
@@ -106,7 +106,7 @@ class InverseDynamicsModel(Model[Plant]):
         """Component → its direction in the joints, shape (joints,)."""
         self._onto: dict[str, Array] = {}
         """Component → share of its force in each observed row, shape (rows,)."""
-        for component in (*guides, *rotors, *schedules):
+        for component in (*guides, *rotors, *schedules, *warming):
             along, onto = np.zeros(len(joints)), np.zeros(len(self.rows))
             for joint, coefficient in component.acts_on:
                 if joint in self._place:
@@ -219,13 +219,16 @@ class InverseDynamicsModel(Model[Plant]):
     def _share_of(self, name: str, plant: Plant, motion: Kinematics, bodies: Array) -> Array:
         """Return the force of a guide or rotor along its own direction, N, shape (ticks,)."""
         along = self._along[name]
-        component = component_of(plant, name, Guide, Rotor, Schedule)
+        component = component_of(plant, name, Guide, Rotor, Schedule, Warming)
         if isinstance(component, Rotor):
             return component.inertia * (along @ motion[2])
-        if isinstance(component, Schedule):
+        if isinstance(component, Schedule | Warming):
             own_motion = np.einsum("j,kjt->kt", along, motion)
             error = self._position_error(along)
             over = max(ELASTIC * error, 1e-9 * max(float(np.ptp(own_motion[0])), 1e-12))
+            if isinstance(component, Warming):
+                level = component.fade(motion.shape[2], self._interval)
+                return scheduled_force(component.schedule, level, own_motion, 1.0 / over)
             level = follow(component, self._schedules[name], self._period)[:: self.every]
             return scheduled_force(component, level, own_motion, 1.0 / over)
         guide = Guide(*(float(value) for value in component))

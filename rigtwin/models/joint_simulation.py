@@ -11,7 +11,16 @@ from collections.abc import Callable
 
 import numpy as np
 
-from rigtwin.components import PUSHERS, Guide, Mass, PositionActuator, Rotor, Schedule, component_of
+from rigtwin.components import (
+    PUSHERS,
+    Guide,
+    Mass,
+    PositionActuator,
+    Rotor,
+    Schedule,
+    Warming,
+    component_of,
+)
 from rigtwin.components.conditioning import actuator, condition_all, hold
 from rigtwin.components.end_stops import soften_stops
 from rigtwin.components.guide_step import guide_step_of
@@ -100,6 +109,11 @@ class JointSimulation:
             if component.joint == replay.joint.name and component.channel is not None
         }
         """Name of each schedule of the joint → values of its channel, shape (ticks,)."""
+        self._warming = [
+            component.name
+            for component in machine.components_of(Warming)
+            if component.joint == replay.joint.name
+        ]
         self._last: Memo[Array] = Memo(KEPT)
         self._starts: Memo[Start] = Memo(KEPT)
         self._start = self._find_start()
@@ -201,7 +215,7 @@ class JointSimulation:
         """Return all components that the motion depends on, as a key of remembered motions."""
         replay = self._replay
         names = [replay.guide, replay.mass, replay.rotor, self.mover.name, "computer"]
-        names += [*self._schedules, *self.control.sensors]
+        names += [*self._schedules, *self._warming, *self.control.sensors]
         if self._start is not None and self._start.name not in names:
             names.append(self._start.name)
         return select(plant, [name for name in names if name is not None])
@@ -293,13 +307,17 @@ class JointSimulation:
             return out
         motion = np.ascontiguousarray(np.stack([position, velocity, acceleration]))
         out[2] = self.required_force(plant, motion, error)
-        if self._schedules:
-            stroke = max(float(np.ptp(position)), 1e-12)
-            over = max(ELASTIC * error, 1e-9 * stroke)
-            for name, recorded in self._schedules.items():
-                schedule = component_of(plant, name, Schedule)
-                level = follow(schedule, recorded, self._period)[:: self.every]
-                out[2] += scheduled_force(schedule, level, motion, 1.0 / over)
+        stroke = max(float(np.ptp(position)), 1e-12)
+        spring = 1.0 / max(ELASTIC * error, 1e-9 * stroke)
+        for name, recorded in self._schedules.items():
+            schedule = component_of(plant, name, Schedule)
+            level = follow(schedule, recorded, self._period)[:: self.every]
+            out[2] += scheduled_force(schedule, level, motion, spring)
+        for name in self._warming:
+            warming = component_of(plant, name, Warming)
+            if warming.coulomb != 0.0 or warming.viscous != 0.0:
+                level = warming.fade(len(position), self.interval)
+                out[2] += scheduled_force(warming.schedule, level, motion, spring)
         return out
 
     def required_force(self, plant: Plant, motion: Array, error: float) -> Array:

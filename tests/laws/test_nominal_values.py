@@ -30,6 +30,7 @@ from rigtwin.components import (
     Tyre,
     VelocitySensor,
     VelocityServo,
+    Warming,
 )
 
 NO_LIMIT = 1e9
@@ -75,6 +76,7 @@ NOMINAL: dict[type, dict[str, float]] = {
     Mains: {"frequency": 50.0},
     Mass: {},
     Schedule: {},
+    Warming: {"time": 10.0},
     Motor: {
         "constant": 186.0,
         "time_constant": 1.26e-3,
