@@ -104,7 +104,7 @@ VIEWS = {
     POSITIONS: (
         OtherView(
             SERVOS,
-            ENOUGH,
+            1.0,
             None,
             "judged as servos that give way to their load, which leaves less of the motion; "
             "--test position-commands judges them as actuators that do not",
@@ -147,9 +147,12 @@ def describe_otherwise(described: Described, view: OtherView) -> Described | Non
             return None
         if not are_commands and not _may_be_commands(described, mechanism):
             return None
-    # The damping of a servo that gives way may be unknown; one that is pushed needs a model.
-    known = may_be_servos if reading.kind.test == POSITIONS else are_servos
-    if view.test == SERVOS and not known(mechanism, reading.joints):
+    if view.test == SERVOS and reading.kind.test == POSITIONS:
+        # Servos of an arm whose damping is unknown take minutes, each of its own seconds.
+        together = are_coupled(mechanism, list(reading.joints))
+        if together or not may_be_servos(mechanism, reading.joints):
+            return None
+    elif view.test == SERVOS and not are_servos(mechanism, reading.joints):
         return None
     try:
         return describe_log(described.machine.model, described.log, described.stated, view.test)
