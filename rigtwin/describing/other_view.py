@@ -9,7 +9,7 @@ that the actuator never gave is no force of any law, but it predicts the motion 
 limit is known.
 
 Position commands of a model without damping are taken for actuators that follow them whatever the
-load. A servo that gives way to its load is seen better as a servo.
+load. A single servo that gives way to its load is seen better as a servo.
 
 A log of servos may hold their commands and their forces. Play before the position sensor, or a
 force that is sampled between two commands, contradicts inverse dynamics, but not the motion that
@@ -148,9 +148,8 @@ def describe_otherwise(described: Described, view: OtherView) -> Described | Non
         if not are_commands and not _may_be_commands(described, mechanism):
             return None
     if view.test == SERVOS and reading.kind.test == POSITIONS:
-        # Servos of an arm whose damping is unknown take minutes, each of its own seconds.
-        together = are_coupled(mechanism, list(reading.joints))
-        if together or not may_be_servos(mechanism, reading.joints):
+        # Servos of a whole arm whose damping is unknown take minutes, a single one takes seconds.
+        if len(reading.joints) > 1 or not may_be_servos(mechanism, reading.joints):
             return None
     elif view.test == SERVOS and not are_servos(mechanism, reading.joints):
         return None
