@@ -51,12 +51,7 @@ def match_columns(
     matches: list[Match] = []
     unused: dict[str, str] = {}
     numbered: dict[str, tuple[str, ...]] = {}
-    headings = {name: split_words(name) for name in _distinct(columns) if name not in skipped}
-    abbreviated = read_abbreviations(list(headings.values()), aliases)
-    written = {
-        column: tuple(abbreviated.get(word, word) for word in heading)
-        for column, heading in headings.items()
-    }
+    written = _spell_out([name for name in _distinct(columns) if name not in skipped], aliases)
     by_name = _match_names(written, columns, aliases, len(joints))
     for column, words in written.items():
         unit, named = columns.units.get(column, ""), by_name[column]
@@ -83,16 +78,30 @@ def match_columns(
     if (match := _remaining(columns, leading, matches, unused)) is not None:
         matches.append(match)
         del unused[match.column]
-    used: list[Match] = []
-    for match in matches:
-        unit = columns.units.get(match.column, "")
-        if match.quantity is JointQuantity.OTHER:
-            unused[match.column] = "no test needs this quantity"
-        elif _is_supply(mechanism, match, read_words(headings[match.column], unit)):
-            unused[match.column] = "a voltage, and the model's actuator takes a position"
-        else:
-            used.append(match)
-    return used, unused
+    useless = {
+        match.column: why for match in matches if (why := _useless(mechanism, match, columns))
+    }
+    return [match for match in matches if match.column not in useless], unused | useless
+
+
+def _spell_out(names: Sequence[str], aliases: Sequence[Alias]) -> dict[str, tuple[str, ...]]:
+    """Return the words of each column's name, with abbreviations of joints' names spelt out."""
+    headings = {name: split_words(name) for name in names}
+    abbreviated = read_abbreviations(list(headings.values()), aliases)
+    return {
+        column: tuple(abbreviated.get(word, word) for word in heading)
+        for column, heading in headings.items()
+    }
+
+
+def _useless(mechanism: Mechanism, match: Match, columns: Columns) -> str:
+    """Return why a column that names a joint is not used; empty where it is."""
+    meaning = read_words(split_words(match.column), columns.units.get(match.column, ""))
+    if match.quantity is JointQuantity.OTHER:
+        return "no test needs this quantity"
+    if _is_supply(mechanism, match, meaning):
+        return "a voltage, and the model's actuator takes a position"
+    return ""
 
 
 def _is_supply(mechanism: Mechanism, match: Match, meaning: Meaning) -> bool:

@@ -93,6 +93,24 @@ def choose_kind(
     # Every command goes to an actuator that takes a position.
     if commanded and placed and all(_takes_position(mechanism, joint) for joint in commanded):
         return _position_test(mechanism, commanded)
+    kind = _kind_by_commands(mechanism, slots, joints, measured, still, placed and by_commands)
+    if kind is not None:
+        return kind
+    raise _question(mechanism, joints, measured, commanded)
+
+
+def _kind_by_commands(
+    mechanism: Mechanism,
+    slots: Slots,
+    joints: Sequence[str],
+    measured: Sequence[str],
+    still: Sequence[str],
+    are_forces: bool,
+) -> ReplayKind | None:
+    """Return the kind of a test that commands drive; None where a joint lacks one.
+
+    `are_forces` says whether commanded forces can be held against those along the motion.
+    """
     pushed = [joint for joint in joints if _is_pushed(mechanism, slots, joint, (*measured, *still))]
     # Joints without an actuator move freely; all others must be pushed by something known.
     if pushed and all(actuator_on(mechanism, j) is None or j in pushed for j in joints):
@@ -102,11 +120,11 @@ def choose_kind(
             return ReplayKind(FORCES, "the actuators' commands are in the log")
         # Small errors of the forces make the predicted motion of an arm run away.
         together = len(pushed) == len(joints) > 1 and are_coupled(mechanism, joints)
-        if placed and together and by_commands:
+        if together and are_forces:
             why = "the actuators take forces, and those of every joint are in the log"
             return ReplayKind(INVERSE, why)
         return ReplayKind(FORCES, "the actuators take forces, and those are in the log")
-    raise _question(mechanism, joints, measured, commanded)
+    return None
 
 
 def _read_stated(stated: str) -> str:
