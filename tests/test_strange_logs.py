@@ -10,6 +10,7 @@ import pytest
 import rigtwin
 from rigtwin import RigtwinError
 from rigtwin.importing.text import read_text
+from rigtwin.recording import RecordedTest
 
 MODEL = """
 <mujoco>
@@ -26,7 +27,7 @@ TIME = 0.005 * np.arange(1000)
 ANGLE = 0.8 * np.sin(2.0 * TIME)
 
 
-def describe(folder: Path, log: dict[str, np.ndarray]) -> rigtwin.Recording:
+def describe(folder: Path, log: dict[str, np.ndarray]) -> RecordedTest:
     path = folder / "arm.xml"
     path.write_text(MODEL)
     return rigtwin.describe(path, log).record()
