@@ -27,6 +27,9 @@ PARTS = (0.3, 0.1, -0.1)
 TIMES = (5.0, 20.0, 80.0)
 """Times within which friction fades, in characteristic times of the motion, at which it starts."""
 
+LARGEST = 100.0
+"""Largest friction of a cold machine, in forces of the motion."""
+
 
 class Warming(NamedTuple):
     """Friction of a guide beyond that of the warm machine.
@@ -57,7 +60,10 @@ def _cold(size: str) -> Guess:
         values = tuple(
             (share * force, times * scales.time) for share, times in product(PARTS, TIMES)
         )
-        return Starts(values, (0.005 * force, 0.1 * scales.time))
+        # Friction that fades within ages does not differ from friction that stays.
+        times = scales.period, TIMES[-1] * scales.time
+        bounds = (-LARGEST * force, LARGEST * force), times
+        return Starts(values, (0.005 * force, 0.1 * scales.time), bounds=bounds)
 
     return guess
 
