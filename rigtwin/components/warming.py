@@ -6,8 +6,9 @@ With the time t since the log began, and the velocity v of the joint:
 
 Dry friction of unit size, s from −1 to 1, is that of a schedule (`schedule`). Grease is the stiffer
 the colder it is, and a joint that works approaches a steady temperature exponentially, as a body
-that loses heat in proportion to its temperature does [Bittencourt, Gunnarsson, IEEE/ASME
-Transactions on Mechatronics 17(4) (2012) 767]. A negative value is friction that grows.
+that loses heat in proportion to its temperature does. How the friction of a robot's joint falls
+with its temperature is measured in [Bittencourt, Gunnarsson, J. Dyn. Sys., Meas., Control 134(5)
+(2012) 051013]. A negative value is friction that grows.
 """
 
 from __future__ import annotations
@@ -25,8 +26,8 @@ from rigtwin.numerics.arrays import Array
 PARTS = (0.3, 0.1, -0.1)
 """Shares of the motion's force at which a search starts, at the beginning of the log."""
 TIMES = (5.0, 20.0, 80.0)
-"""Times within which friction fades, in characteristic times of the motion, at which it starts."""
-
+"""Starting times within which friction fades, in characteristic times of the motion. The last one
+is also the longest: friction that fades within ages does not differ from friction that stays."""
 LARGEST = 100.0
 """Largest friction of a cold machine, in forces of the motion."""
 
@@ -60,9 +61,7 @@ def _cold(size: str) -> Guess:
         values = tuple(
             (share * force, times * scales.time) for share, times in product(PARTS, TIMES)
         )
-        # Friction that fades within ages does not differ from friction that stays.
-        times = scales.period, TIMES[-1] * scales.time
-        bounds = (-LARGEST * force, LARGEST * force), times
+        bounds = (-LARGEST * force, LARGEST * force), (scales.period, TIMES[-1] * scales.time)
         return Starts(values, (0.005 * force, 0.1 * scales.time), bounds=bounds)
 
     return guess

@@ -23,11 +23,12 @@ from rigtwin.description.replay import ReplayOf, Row
 from rigtwin.models.bodies import inertia_at
 from rigtwin.models.forward_arrays import GuideContacts, Pushers, State, allocate
 from rigtwin.models.forward_motion import advance
-from rigtwin.models.initial_state import InitialState, Seen
+from rigtwin.models.initial_state import InitialState
 from rigtwin.models.joint_drives import JointDrives, recorded
 from rigtwin.models.joint_layout import JointLayout
 from rigtwin.models.joint_simulation import KEPT, LIGHTEST
 from rigtwin.models.multibody import Multibody
+from rigtwin.models.seen import Seen
 from rigtwin.models.windows import Sense, Window, WindowStarts, divide
 from rigtwin.numerics.arrays import Array, clip_diverged
 from rigtwin.numerics.memo import Memo

@@ -33,7 +33,7 @@ def press(
     state: State,
     work: WorkSpace,
 ) -> tuple[float, float]:
-    """Return the force of a servo's rotor on its joint, and the damping of the joint by it.
+    """Return the force of a motor's rotor on its joint, and the damping of the joint by it.
 
     Parameters
     ----------
@@ -42,11 +42,11 @@ def press(
     mass
         Inertia of joint and rotor together, kg.
     a
-        Index of the servo.
+        Index of the actuator.
     at, rate
-        Position and velocity of the joint along the servo, m and m/s.
+        Position and velocity of the joint along the actuator, m and m/s.
     pushed, held_by
-        Force of the servo on its rotor without damping, N, and its damping, Ns/m.
+        Force of the actuator on its rotor without damping, N, and its damping, Ns/m.
     h
         Integration step, s.
     state, work
