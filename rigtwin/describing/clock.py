@@ -11,12 +11,26 @@ from rigtwin.describing.quantity import COMMANDED, TIME, TIME_UNITS, WORDS
 from rigtwin.describing.question import ask, enumerate_names, option
 from rigtwin.errors import RigtwinError
 from rigtwin.importing.columns import Columns
-from rigtwin.importing.timing import JITTER, MOST_OFF, find_period, most_off
+from rigtwin.importing.timing import (
+    JITTER,
+    MOST_OFF,
+    find_period,
+    interpolate,
+    is_held,
+    most_off,
+)
 from rigtwin.importing.units import unit_of
 from rigtwin.numerics.arrays import Array
+from rigtwin.signals.noise import white_noise
 
 SLOWEST, FASTEST = 0.15, 1e-4
 """s; steps of a log of a machine's motion are taken to lie between."""
+ALIGNED = 0.2
+"""Largest drift of a round grid against the rows over the whole log, in periods."""
+SLIGHT, SMOOTHER, ROUGHER = 0.01, 0.65, 1.2
+"""Deviation of a step, as a share of the period, below which time stamps are even; and ratios of
+the roughness by the time stamps to that by rows: below the first in one column and the second in
+all, the rows were sampled when their stamps say."""
 UNITS = ("s", "ms", "us", "ns")
 FEWEST, UNEVEN = 50, 0.5
 """Smallest number of rows, and largest deviation of a step as a share of the median step, of a
@@ -103,10 +117,54 @@ def find_clock(columns: Columns, stated: str = "") -> Clock:
     stamps = time[moving]
     uneven = np.abs(np.diff(stamps) - period) > JITTER * period
     is_uneven = bool(uneven.any()) or most_off(stamps) > MOST_OFF * period
-    # Three digits: the median of a jittering clock is not exact, and the intended period is a round
-    # number.
-    resample = float(f"{float(np.median(np.diff(stamps))):.3g}") if is_uneven else None
-    return Clock(column, unit, period, resample, why, assumed)
+    is_uneven = is_uneven or _stamps_tell(stamps, moving, columns, column)
+    return Clock(column, unit, period, _even_period(stamps) if is_uneven else None, why, assumed)
+
+
+def _stamps_tell(stamps: Array, moving: Array, columns: Columns, column: str) -> bool:
+    """Return whether rows of a slightly uneven time were sampled when their stamps say.
+
+    A loop that runs early or late samples at uneven times, and a message that waits in a queue
+    only bears an uneven stamp. A motion is smooth in the time at which it was sampled.
+
+    Parameters
+    ----------
+    stamps
+        Rising time stamps, s, shape (kept rows,).
+    moving
+        Whether a row is kept, shape (rows,).
+    columns
+        Columns of the log.
+    column
+        Column of the time.
+    """
+    period = _even_period(stamps)
+    if np.max(np.abs(np.diff(stamps) - period)) < SLIGHT * period:
+        return False
+    ticks = np.arange(stamps[0], stamps[-1], period)
+    ratios = []
+    for name, values in columns.values.items():
+        kept = values[moving]
+        if name == column or not np.isfinite(kept).all() or is_held(kept):
+            continue
+        if (by_row := white_noise(kept)) > 0.0:
+            ratios.append(white_noise(interpolate(stamps, kept, ticks, np.inf)) / by_row)
+    # Where noise hides the motion's smoothness the spline still averages it, to about 0.8.
+    return bool(ratios) and min(ratios) < SMOOTHER and max(ratios) < ROUGHER
+
+
+def _even_period(stamps: Array) -> float:
+    """Return the period of the grid to which uneven rows are resampled, s.
+
+    It is the mean step without gaps, so that most ticks lie near a row. It is rounded where the
+    round grid stays as near to the rows, as the intended period usually is a round number.
+    """
+    steps = np.diff(stamps)
+    ordinary = steps[np.abs(steps - np.median(steps)) < JITTER * np.median(steps)]
+    mean = float(np.mean(ordinary))
+    rounded = float(f"{mean:.3g}")
+    drifts = abs(mean - rounded) * len(steps) > ALIGNED * mean
+    return float(f"{mean:.8g}") if drifts else rounded
 
 
 def _split(stated: str) -> tuple[str, str]:

@@ -15,6 +15,9 @@ JITTER = 0.5
 MOST_OFF = 5.0
 """Largest distance of a time stamp from even ticks, in periods: rows that wait in a buffer come in
 bursts."""
+HELD, FEWEST_OF_SPLINE = 0.5, 8
+"""Share of repeated values from which a signal is held from row to row rather than sampled, and
+smallest number of rows of a spline."""
 PLAUSIBLE = (1e-5, 0.1)
 """s; periods that a time column without a unit may have in seconds."""
 POSSIBLE = (1e-6, 10.0)
@@ -141,10 +144,32 @@ def require_even_ticks(time: Array, period: float, report: list[str]) -> None:
         report.append(f"time stamps are off by up to {worst:.2g} s; taken as ticks of {period:g} s")
 
 
+def is_held(values: Array) -> bool:
+    """Return whether most values of a signal repeat the one before, as those of a command."""
+    return bool(np.mean(np.diff(values) == 0.0) > HELD)
+
+
+def interpolate(time: Array, values: Array, ticks: Array, longest: float) -> Array:
+    """Return a signal between its rows: by a cubic spline, and straight where it would overshoot.
+
+    A straight line between two rows averages their noise, so that the noise of the result looks
+    half as strong as it is at low frequencies. Held values, as those of commands, and steps longer
+    than `longest`, s, stay straight.
+    """
+    straight = np.interp(ticks, time, values)
+    if len(values) < FEWEST_OF_SPLINE or is_held(values):
+        return straight
+    from scipy.interpolate import make_interp_spline
+
+    smooth = make_interp_spline(time, values, k=3)(ticks)
+    following = np.clip(np.searchsorted(time, ticks), 1, len(time) - 1)
+    return np.where(np.diff(time)[following - 1] > longest, straight, smooth)
+
+
 def resample(
     time: Array, signals: Signals, period: float, wanted: float, report: list[str]
 ) -> tuple[Array, Signals]:
-    """Return time and signals at another period, interpolated linearly; report bridged gaps.
+    """Return time and signals at another period; report bridged gaps.
 
     A low pass runs first where the new period is longer, so that nothing is aliased. Raises
     RigtwinError if that makes more values than fit into memory.
@@ -173,6 +198,6 @@ def resample(
         # short signal has not enough samples for the filter to settle.
         if wanted > 1.5 * period and len(values) > 60:
             values = sosfiltfilt(butter(4, 0.8 * period / wanted, output="sos"), values)
-        resampled[name] = np.interp(ticks, time, values)
+        resampled[name] = interpolate(time, values, ticks, (1.0 + JITTER) * period)
     report.append(f"resampled from {period:g} s to {wanted:g} s: {len(ticks)} ticks")
     return ticks, resampled
