@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rigtwin.describing.heading import split_words
 from rigtwin.describing.quantity import COMMANDED, TIME, TIME_UNITS, WORDS
@@ -25,8 +26,6 @@ from rigtwin.signals.noise import white_noise
 
 SLOWEST, FASTEST = 0.15, 1e-4
 """s; steps of a log of a machine's motion are taken to lie between."""
-ALIGNED = 0.2
-"""Largest drift of a round grid against the rows over the whole log, in periods."""
 SLIGHT, SMOOTHER, ROUGHER = 0.01, 0.65, 1.2
 """Deviation of a step, as a share of the period, below which time stamps are even; and ratios of
 the roughness by the time stamps to that by rows: below the first in one column and the second in
@@ -112,16 +111,18 @@ def find_clock(columns: Columns, stated: str = "") -> Clock:
     factor = unit_of(unit)[1]
     time = factor * columns.values[column]
     # Rows that repeat a time stamp say nothing of the period.
-    moving = np.concatenate([[True], np.diff(time) > 0.0])
+    moving = np.diff(time, prepend=-np.inf) > 0.0
     period = find_period(time[moving])
     stamps = time[moving]
     uneven = np.abs(np.diff(stamps) - period) > JITTER * period
     is_uneven = bool(uneven.any()) or most_off(stamps) > MOST_OFF * period
-    is_uneven = is_uneven or _stamps_tell(stamps, moving, columns, column)
-    return Clock(column, unit, period, _even_period(stamps) if is_uneven else None, why, assumed)
+    is_uneven = is_uneven or _stamps_tell(stamps, period, moving, columns, column)
+    return Clock(column, unit, period, period if is_uneven else None, why, assumed)
 
 
-def _stamps_tell(stamps: Array, moving: Array, columns: Columns, column: str) -> bool:
+def _stamps_tell(
+    stamps: Array, period: float, moving: NDArray[np.bool_], columns: Columns, column: str
+) -> bool:
     """Return whether rows of a slightly uneven time were sampled when their stamps say.
 
     A loop that runs early or late samples at uneven times, and a message that waits in a queue
@@ -131,6 +132,8 @@ def _stamps_tell(stamps: Array, moving: Array, columns: Columns, column: str) ->
     ----------
     stamps
         Rising time stamps, s, shape (kept rows,).
+    period
+        Typical step, s.
     moving
         Whether a row is kept, shape (rows,).
     columns
@@ -138,7 +141,6 @@ def _stamps_tell(stamps: Array, moving: Array, columns: Columns, column: str) ->
     column
         Column of the time.
     """
-    period = _even_period(stamps)
     if np.max(np.abs(np.diff(stamps) - period)) < SLIGHT * period:
         return False
     ticks = np.arange(stamps[0], stamps[-1], period)
@@ -151,20 +153,6 @@ def _stamps_tell(stamps: Array, moving: Array, columns: Columns, column: str) ->
             ratios.append(white_noise(interpolate(stamps, kept, ticks, np.inf)) / by_row)
     # Where noise hides the motion's smoothness the spline still averages it, to about 0.8.
     return bool(ratios) and min(ratios) < SMOOTHER and max(ratios) < ROUGHER
-
-
-def _even_period(stamps: Array) -> float:
-    """Return the period of the grid to which uneven rows are resampled, s.
-
-    It is the mean step without gaps, so that most ticks lie near a row. It is rounded where the
-    round grid stays as near to the rows, as the intended period usually is a round number.
-    """
-    steps = np.diff(stamps)
-    ordinary = steps[np.abs(steps - np.median(steps)) < JITTER * np.median(steps)]
-    mean = float(np.mean(ordinary))
-    rounded = float(f"{mean:.3g}")
-    drifts = abs(mean - rounded) * len(steps) > ALIGNED * mean
-    return float(f"{mean:.8g}") if drifts else rounded
 
 
 def _split(stated: str) -> tuple[str, str]:
