@@ -40,8 +40,8 @@ PAGE_HEADER = (
     "what breaks",
     "stopped",
     "never seen",
-    "ticks to safe, at most",
-    "of a limit, at most",
+    "ticks until safe, maximum",
+    "share of a limit, maximum",
 )
 """Columns of the table that `--out` writes: one row for each place."""
 MARK = "<!-- made by rigtwin faults -->"

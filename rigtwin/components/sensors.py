@@ -1,7 +1,9 @@
 """Sensors: parameters, and the law from the true quantity to the reading.
 
-y(t) = gain·x_lag(t − delay) + offset + drift·t, where x_lag is the quantity behind a first-order
-lag. Noise, hum and quantisation come on top (`simulation.converters`, `models.reading`).
+y(t) = gain·x + eccentricity·(sin(x + phase) − sin(phase)) + offset + drift·t, where x is the
+quantity behind a first-order lag and a delay. An encoder whose disc or magnet is off the axis of a
+hinge has an eccentricity: an error that repeats once a turn. Noise, hum and quantisation come on
+top (`simulation.converters`, `models.reading`).
 """
 
 from __future__ import annotations
@@ -65,6 +67,8 @@ class PositionSensor(NamedTuple):
     drift: Annotated[float, Quantity("m/s", -100.0, 100.0, NONE)] = 0.0
     lag: Annotated[float, Quantity("s", 0.0, 10.0, NONE)] = 0.0
     delay: Annotated[float, Quantity("s", 0.0, 10.0, NONE)] = 0.0
+    eccentricity: Annotated[float, Quantity("m", 0.0, 0.2, "0: centred on the hinge")] = 0.0
+    phase: Annotated[float, Quantity("rad", -7.0, 7.0, NONE)] = 0.0
     white: Annotated[float, Quantity("m", 0.0, 1e7, NONE)] = 0.0
     hum: Annotated[float, Quantity("m", 0.0, 1e7, NONE)] = 0.0
     resolution: Annotated[float, Quantity("m", 0.0, 1e7, NONE)] = 0.0
@@ -131,6 +135,8 @@ class Transducer(NamedTuple):
 
     neutral: bool  # Whether the reading is the true quantity.
     gain: float  # Gain of the reading.
+    eccentricity: float  # Amplitude of the error that repeats once a turn.
+    phase: float  # Phase of the error that repeats once a turn, rad.
     offset: float  # Offset of the reading.
     drift: float  # Drift of the reading per tick.
     delay: float  # Delay in ticks.
@@ -147,17 +153,53 @@ class TransducerState(NamedTuple):
 def transducer(sensor: Sensor, period: float) -> Transducer:
     """Return the law of a sensor, discretised for ticks of a period, s."""
     drift = sensor.drift * period
-    parameters = sensor.gain, sensor.offset, sensor.delay, sensor.lag, drift
-    neutral = parameters == (1.0, 0.0, 0.0, 0.0, 0.0)
+    amplitude, phase = _eccentricity(sensor)
+    parameters = sensor.gain, sensor.offset, sensor.delay, sensor.lag, drift, amplitude
+    neutral = parameters == (1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     # Tick by tick, a negative lag or delay would need future values: only `apply_sensor` has them.
     lag, delay = max(sensor.lag, 0.0), max(sensor.delay, 0.0)
     share = 1.0 if lag == 0.0 else 1.0 - math.exp(-period / lag)
-    return Transducer(neutral, sensor.gain, sensor.offset, drift, delay / period, share)
+    return Transducer(
+        neutral, sensor.gain, amplitude, phase, sensor.offset, drift, delay / period, share
+    )
 
 
 def start_transducer(sensor: Transducer) -> TransducerState:
     """Return the state of a sensor before its first sample."""
     return TransducerState(ring(sensor.delay, 0.0), np.array([-1.0, 0.0, 0.0, 0.0]))
+
+
+def _eccentricity(sensor: Sensor) -> tuple[float, float]:
+    """Return amplitude and phase of the error that repeats once a turn, rad."""
+    if isinstance(sensor, PositionSensor):
+        return sensor.eccentricity, sensor.phase
+    return 0.0, 0.0
+
+
+def undo_static(sensor: Sensor, reading: Array) -> Array:
+    """Return the quantity behind readings without drift, lag and delay, of the same shape.
+
+    Parameters
+    ----------
+    sensor
+        Sensor with its parameters.
+    reading
+        Readings, of any shape.
+    """
+    amplitude, phase = _eccentricity(sensor)
+    quantity = np.asarray((reading - sensor.offset) / sensor.gain)
+    # Each step of Newton's method squares the error, which is a few hundredths at first.
+    for _ in range(4 if amplitude else 0):
+        error = amplitude * (np.sin(quantity + phase) - math.sin(phase))
+        excess = sensor.gain * quantity + error + sensor.offset - reading
+        quantity = quantity - excess / slope_of(sensor, quantity)
+    return quantity
+
+
+def slope_of(sensor: Sensor, quantity: Array) -> Array:
+    """Return by how much a reading grows with the quantity, at quantities of any shape."""
+    amplitude, phase = _eccentricity(sensor)
+    return np.asarray(sensor.gain + amplitude * np.cos(quantity + phase))
 
 
 def remove_drift(sensor: Sensor, measured: Array, period: float) -> Array:
@@ -193,6 +235,9 @@ def transduce(sensor: Transducer, state: TransducerState, value: float) -> float
     state.memory[1] += sensor.share * (seen - state.memory[1])
     state.memory[2] = late
     reading = sensor.gain * state.memory[1] + sensor.offset + state.memory[3]
+    if sensor.eccentricity != 0.0:
+        turned = math.sin(state.memory[1] + sensor.phase) - math.sin(sensor.phase)
+        reading += sensor.eccentricity * turned
     state.memory[3] += sensor.drift
     return reading
 

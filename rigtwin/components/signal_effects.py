@@ -22,6 +22,11 @@ from rigtwin.components.servo import Servo, VelocityServo
 from rigtwin.components.starts import at_limits, fixed_starts, late_or_early_starts, late_starts
 
 ACTS_LATE = "the force acts later than it is recorded, as that of an actuator behind its command"
+ECCENTRIC = Starts(
+    tuple(product((0.01, 0.04), (-2.0, 0.0, 2.0))),
+    (1e-3, 0.05),
+)
+"""Starts of amplitude and phase of an error once a turn, rad."""
 BELOW = (0.95, 0.8, 0.65, 0.5, 0.35, 0.2, 0.1)
 """Starting values of a lower limit, as shares of the known limit."""
 
@@ -217,6 +222,13 @@ KINDS = (
             LoadCell: fixed_starts((-2.0, -0.3, 0.3, 2.0), 0.02),
             **_for_types(_drift, *DESCRIBED_SENSORS),
         },
+    ),
+    Kind(
+        "eccentricity",
+        "eccentricity",
+        ("eccentricity", "phase"),
+        "an error that repeats once a turn, as that of an encoder off its axis",
+        {PositionSensor: lambda _: ECCENTRIC},
     ),
     Kind(
         "hum",

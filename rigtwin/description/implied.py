@@ -213,6 +213,8 @@ def _add_group(
         if test == FORCES and weighs:
             # The gravity load depends on the true angle, which makes the encoder's zero observable.
             tables[sensors[0]]["effects"] = ["offset"]
+        if test == FORCES and mechanism.turns(joints[0]) and joints[0] not in velocities:
+            tables[sensors[0]]["effects"].append("eccentricity")
     implied.replays.append(replay)
 
 
@@ -227,6 +229,8 @@ def _sensor_effects(mechanism: Mechanism, joint: str, test: str, has_velocity: b
     is_servo = test == SERVOS and actuator_on(mechanism, joint) is not None
     if not is_servo and not has_velocity:
         effects.append("delay")
+    if test == FORCES and mechanism.turns(joint) and not has_velocity:
+        effects.append("eccentricity")
     return effects
 
 

@@ -88,9 +88,12 @@ def _dominance(scored: Scored, number: int) -> float:
 def _share_of(effect: Effect, posterior: HypothesisPosterior) -> float:
     """Return the share of the gap's amplitude that returns where an effect is left out.
 
-    Without it, the best hypothesis counts that has no other effect in its place.
+    Each signal counts by its share in the effect's response: the gap of another joint says nothing
+    of the laws of this one. Without the effect, the best hypothesis counts that has no other effect
+    in its place.
     """
-    gap = float(posterior.excess(posterior.empty).sum())
+    reach = posterior.best.reach[posterior.best.fit.effects.index(effect)]
+    gap = float(reach @ posterior.excess(posterior.empty))
     remaining = {*posterior.best.fit.effects} - {effect}
     # The ranking is sorted by cost and contains the empty hypothesis, so the first match is the
     # best one and always exists.
@@ -99,8 +102,8 @@ def _share_of(effect: Effect, posterior: HypothesisPosterior) -> float:
         for hypothesis in posterior.ranking
         if {*hypothesis.scored.fit.effects} <= remaining
     )
-    returned = posterior.excess(without).sum() - posterior.excess(posterior.best).sum()
-    return math.sqrt(max(float(returned), 0.0) / gap) if gap > 0.0 else 0.0
+    returned = float(reach @ (posterior.excess(without) - posterior.excess(posterior.best)))
+    return math.sqrt(max(returned, 0.0) / gap) if gap > 0.0 else 0.0
 
 
 def _corrects_form(share: float, expected: float, remains: float, clean: float) -> float:

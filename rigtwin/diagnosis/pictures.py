@@ -64,6 +64,7 @@ PICTURES: dict[str, str] = {
     "gain_asymmetry": "line",
     "offset": "line",
     "drift": "record",
+    "eccentricity": "position",
     "saturation": "line",
     "deadband": "line",
     "deadband_asymmetry": "line",

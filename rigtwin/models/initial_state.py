@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from rigtwin.components.plant import Plant
-from rigtwin.components.sensors import sensor_of
+from rigtwin.components.sensors import sensor_of, slope_of, undo_static
 from rigtwin.models.joint_start import FORGOTTEN, SHOWS, guess_place
 from rigtwin.models.seen import Judged, Neighbour, Seen
 from rigtwin.models.start import (
@@ -97,15 +97,15 @@ class InitialState:
             value, slope = self._begun[name]
             # A late sensor shows where the joint was.
             value += slope * (sensor.delay + sensor.lag)
-            value = (value - sensor.offset) / sensor.gain
+            quantity = undo_static(sensor, np.array([value]))
             if seen.kind == "position":
                 places.append(seen.along[None])
-                positions.append(np.array([value - seen.zero]))
+                positions.append(quantity - seen.zero)
                 rates.append(seen.along[None])
-                speeds.append(np.array([(slope - sensor.drift) / sensor.gain]))
+                speeds.append((slope - sensor.drift) / slope_of(sensor, quantity))
                 continue
             rates.append(CLOSELY * seen.along[None])
-            speeds.append(np.array([CLOSELY * value]))
+            speeds.append(CLOSELY * quantity)
             if swinging and np.all(self._unplaced[seen.along != 0.0]):
                 place, _ = guess_place(seen.measured, self._period)
                 places.append(seen.along[None])

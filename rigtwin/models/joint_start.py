@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from rigtwin.components.sensors import Sensor, remove_drift
+from rigtwin.components.sensors import Sensor, remove_drift, slope_of, undo_static
 from rigtwin.models.start import (
     LIKELY,
     Start,
@@ -101,10 +101,11 @@ class JointStart:
         return self.fitted and self._row == 0 and not self._swings_freely
 
     def _read(self, sensor: Sensor) -> Start:
-        value = (self._value - sensor.offset) / sensor.gain
+        quantity = undo_static(sensor, np.array([self._value]))
         if self._row == 1:
-            return 0.0, value
-        return value, (self._slope - sensor.drift) / sensor.gain
+            return 0.0, float(quantity[0])
+        slope = (self._slope - sensor.drift) / slope_of(sensor, quantity)
+        return float(quantity[0]), float(slope[0])
 
     def judge(self, sensor: Sensor, move: Move, form: float, pushes: Array) -> None:
         """Decide whether the error of the state as read is visible, and for how long.
@@ -165,7 +166,7 @@ class JointStart:
     def _measure(self, sensor: Sensor) -> Array:
         """Return the quantity behind the sensor while the joint remembers its start."""
         measured = remove_drift(sensor, self._measured[: self._remembered], self._period)
-        return np.asarray((measured - sensor.offset) / sensor.gain)
+        return undo_static(sensor, measured)
 
     def find(self, sensor: Sensor, move: Move | None) -> Start:
         """Return the initial state.

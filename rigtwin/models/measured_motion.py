@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from rigtwin.components import Guide
 from rigtwin.components.dry_friction import friction, friction_size
-from rigtwin.components.sensors import Sensor, remove_drift
+from rigtwin.components.sensors import Sensor, remove_drift, undo_static
 from rigtwin.numerics.arrays import Array
 
 ENDS = 0.3
@@ -57,12 +57,12 @@ def may_be_at_rest(
 def recover_motion(sensor: Sensor, measured: Array, period: float) -> Array:
     """Recover the true motion from a measured one that was smoothed.
 
-    Inverts the sensor y = gain·x + offset + drift·t, its first-order lag and its delay.
+    Inverts the law of the sensor (`components.sensors`), its first-order lag and its delay.
 
     Parameters
     ----------
     sensor
-        Sensor whose offset, drift, gain, lag and delay are undone.
+        Sensor whose errors are undone.
     measured
         Smoothed reading, shape (ticks,).
     period
@@ -81,7 +81,7 @@ def recover_motion(sensor: Sensor, measured: Array, period: float) -> Array:
     if sensor.delay != 0.0:
         ticks = np.arange(len(signal))
         signal = np.interp(ticks + sensor.delay / period, ticks, signal)
-    return (remove_drift(sensor, signal, period) - sensor.offset) / sensor.gain
+    return undo_static(sensor, remove_drift(sensor, signal, period))
 
 
 def softest_contact(guide: Guide, load: Array, position: Array, error: float) -> float:

@@ -128,10 +128,11 @@ def test_a_rare_effect_that_explains_little_may_correct_the_form_of_a_law(share,
 
 
 def test_the_share_of_an_effect_is_what_returns_without_it():
-    """√((excess without it − excess with it)/gap), of the best hypothesis without it."""
+    """√((excess without it − excess with it)/gap), of the signals that the effect reaches."""
     backlash = find("backlash@rail", PLANT)
+    reach = np.array([[0.5, 0.5], [0.25, 0.75]])
     scored = {
-        effects: SimpleNamespace(fit=SimpleNamespace(effects=effects))
+        effects: SimpleNamespace(fit=SimpleNamespace(effects=effects), reach=reach)
         for effects in ((), (COULOMB,), (COULOMB, backlash))
     }
     excess = dict(zip(scored, ([60.0, 40.0], [20.0, 5.0], [8.0, 1.0]), strict=True))
@@ -141,8 +142,8 @@ def test_the_share_of_an_effect_is_what_returns_without_it():
         ranking=[SimpleNamespace(scored=scored[effects]) for effects in reversed(scored)],
         excess=lambda one: np.array(excess[one.fit.effects]),
     )
-    assert _share_of(backlash, posterior) == pytest.approx(math.sqrt((25.0 - 9.0) / 100.0))
-    assert _share_of(COULOMB, posterior) == pytest.approx(math.sqrt((100.0 - 9.0) / 100.0))
+    assert _share_of(backlash, posterior) == pytest.approx(math.sqrt((3.0 + 3.0) / 45.0))
+    assert _share_of(COULOMB, posterior) == pytest.approx(math.sqrt((26.0 + 19.5) / 50.0))
 
 
 def test_remains_stay_within_the_gap_and_are_none_without_a_gap():

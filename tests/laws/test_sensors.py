@@ -23,10 +23,12 @@ from rigtwin.components.plant import plant_of
 from rigtwin.components.sensors import (
     apply_sensor,
     remove_drift,
+    slope_of,
     start_transducer,
     transduce,
     transducer,
     undo_sensor,
+    undo_static,
 )
 from rigtwin.models.reading import hum_of, make_noise, round_reading
 from rigtwin.simulation.converters import Disturbance, quantise
@@ -153,6 +155,19 @@ def test_a_change_of_a_reading_is_led_back_to_a_change_of_the_quantity():
     led = undo_sensor(PositionSensor(lag=0.01), change, PERIOD)
     rate = 4.0 * np.pi * np.cos(4.0 * np.pi * TIME)
     np.testing.assert_allclose(led[80:-80], (change + 0.01 * rate)[80:-80], atol=1e-3)
+
+
+@law_of("eccentricity", PositionSensor)
+def test_an_encoder_off_its_axis_errs_once_a_turn():
+    """An error of A·(sin(x + φ) − sin φ), and what is behind a reading with it."""
+    turns = 9.0 * WAVE
+    sensor = PositionSensor(gain=1.1, eccentricity=0.06, phase=0.7, offset=0.2)
+    read = apply_sensor(sensor, turns, PERIOD)
+    error = 0.06 * (np.sin(turns + 0.7) - math.sin(0.7))
+    assert read == pytest.approx(1.1 * turns + error + 0.2)
+    assert transducer(PositionSensor(eccentricity=0.01), PERIOD).neutral is False
+    assert undo_static(sensor, read) == pytest.approx(turns, abs=1e-9)
+    assert slope_of(sensor, turns) == pytest.approx(1.1 + 0.06 * np.cos(turns + 0.7))
 
 
 def test_a_lead_is_not_undone_twice():

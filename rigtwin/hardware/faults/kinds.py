@@ -56,7 +56,7 @@ KINDS = (
     FaultKind(
         "wrong sign",
         "sensor",
-        "cable turned round",
+        "wires swapped",
         ("jump", "wheel", "motor", "following"),
         everywhere=False,
     ),
