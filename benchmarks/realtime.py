@@ -19,7 +19,7 @@ from google.protobuf.message import Message
 
 from controllers import Commands
 from experiments import EXPERIMENTS
-from rigtwin.description.changes import from_assignments
+from rigtwin.description.changes import with_changes
 from rigtwin.hardware.daq import CARD
 from rigtwin.hardware.daq.card import Card
 from rigtwin.hardware.daq.table_file import load_table
@@ -125,8 +125,8 @@ def _test(name: str, seconds: float) -> Test:
     here nothing moves.
     """
     experiment = EXPERIMENTS[name]
-    configuration = from_assignments(
-        experiment.configuration, [f"timing.duration={seconds}", "safety.missed=1e5"]
+    configuration = with_changes(
+        experiment.configuration, {"timing": {"duration": seconds}, "safety": {"missed": 1e5}}
     )
     return Test(name, configuration, experiment.demands(configuration, 0), 0, load_table(CARD))
 

@@ -6,7 +6,6 @@ import json
 import math
 import os
 import sys
-from argparse import Namespace
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,17 +14,7 @@ from rigtwin.errors import RigtwinError
 from rigtwin.files import atomic_write, require_path
 
 if TYPE_CHECKING:
-    from rigtwin.description.configuration import Configuration
     from rigtwin.recording import RecordedTest
-
-
-def configured(configuration: Configuration, parsed: Namespace) -> Configuration:
-    """Return a configuration with the changes of `--config` and `--set`, in that order."""
-    from rigtwin.description.changes import from_assignments, from_toml
-
-    if parsed.config is not None:
-        configuration = from_toml(configuration, parsed.config)
-    return from_assignments(configuration, parsed.set)
 
 
 def assigned_settings(texts: Sequence[str]) -> list[dict[str, dict[str, str]]]:

@@ -14,7 +14,6 @@ from controllers import Measurements
 from experiments import EXPERIMENTS
 from rigtwin.components import RigPlant, candidates
 from rigtwin.description.catalogue import find
-from rigtwin.description.changes import from_assignments
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.effects import apply_effects
 from rigtwin.description.settings import Timing
@@ -26,6 +25,7 @@ from rigtwin.rig.simulated import simulate_recording
 from rigtwin.simulation.runner import record
 from tests.helpers.effects import once_a_component, text
 from tests.helpers.recordings import SHIPPED, beside, replace_sensors, shipped
+from tests.helpers.settings import from_assignments
 from tests.helpers.twin import RIG, rig_effect
 
 LIMITS = {

@@ -25,7 +25,7 @@ from experiments import find
 from experiments.vehicles import VEHICLES, configuration
 from rigtwin.components import Computer, Cylinder
 from rigtwin.components.cylinder import closed_loop
-from rigtwin.description.changes import from_toml, with_changes
+from rigtwin.description.changes import with_changes
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.control import RigControl
 from rigtwin.diagnosis.controller import ControllerReplay
@@ -197,7 +197,7 @@ def test_a_corrected_twin_tells_the_controller(tmp_path):
     )
     twin = tmp_path / "twin.toml"
     rigtwin.diagnose(late).save_twin(twin)
-    configuration = from_toml(Configuration(), twin)
+    configuration = with_changes(Configuration(), twin)
     assert configuration.plant.structure_cylinder.delay == pytest.approx(LATE, rel=0.05)
     assert configuration.controller.plate_delay == configuration.plant.structure_cylinder.delay
     # What the controller is told is of tests to come: the recording's own stays.

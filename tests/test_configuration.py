@@ -7,10 +7,11 @@ import pytest
 from controllers import Mode, Settings, Skyhook
 from controllers.quantity import Quantity, fields
 from experiments import EXPERIMENTS
-from rigtwin.description.changes import from_assignments, from_toml, override
+from rigtwin.description.changes import override, with_changes
 from rigtwin.description.configuration import Configuration, flatten, groups, parameters
 from rigtwin.errors import RigtwinError
 from rigtwin.recording.schema import RECORD
+from tests.helpers.settings import from_assignments
 
 EVERY = list(parameters(Configuration()))
 NUMBERS = [(key, value, meaning) for key, value, meaning in EVERY if isinstance(meaning, Quantity)]
@@ -65,7 +66,7 @@ def test_what_is_unknown_is_named_with_what_there_is(text, says):
 def test_toml(tmp_path):
     good = tmp_path / "good.toml"
     good.write_text('[rail]\ncoulomb = 60\n[controller]\nskyhook = "semi-active"\nkp = 0.5\n')
-    changed = from_toml(Configuration(), good)
+    changed = with_changes(Configuration(), good)
     assert (changed.plant.rail.coulomb, changed.controller.skyhook, changed.controller.kp) == (
         60.0,
         Skyhook.SEMI_ACTIVE,
@@ -81,10 +82,10 @@ def test_toml(tmp_path):
         bad = tmp_path / "bad.toml"
         bad.write_text(content)
         with pytest.raises(RigtwinError, match=says) as error:
-            from_toml(Configuration(), bad)
+            with_changes(Configuration(), bad)
         assert str(bad) in str(error.value)
     with pytest.raises(RigtwinError, match="cannot read"):
-        from_toml(Configuration(), tmp_path / "absent.toml")
+        with_changes(Configuration(), tmp_path / "absent.toml")
 
 
 def test_flattened_and_back():

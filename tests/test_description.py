@@ -13,7 +13,7 @@ from rigtwin.components import RigPlant, Scales, Swing, with_parameters
 from rigtwin.components import find as effect_of
 from rigtwin.components.scales import SHARES
 from rigtwin.description.catalogue import find, shipped
-from rigtwin.description.changes import from_assignments, override
+from rigtwin.description.changes import override
 from rigtwin.description.document import examine, load
 from rigtwin.description.effects import without_effect
 from rigtwin.diagnosis.diagnose import diagnose
@@ -22,6 +22,7 @@ from rigtwin.errors import RigtwinError
 from rigtwin.models.joint import JointModel
 from rigtwin.simulation.experiment import find_experiment
 from tests.helpers.described import MJCF, TOML, described, recording_of
+from tests.helpers.settings import from_assignments
 
 
 @pytest.mark.parametrize("name", shipped())

@@ -10,7 +10,6 @@ import pytest
 
 from controllers import Commands, Measurements, Mode, Settings
 from experiments import EXPERIMENTS
-from rigtwin.description.changes import from_assignments
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.settings import Timing
 from rigtwin.errors import RigtwinError
@@ -21,6 +20,7 @@ from rigtwin.simulation.loop import Block, run
 from rigtwin.simulation.runner import record
 from rigtwin.simulation.trip import Trip
 from rigtwin.simulation.twin import Twin
+from tests.helpers.settings import from_assignments
 
 SHORT = Timing(duration=0.6)
 

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import rigtwin.diagnosis
-from rigtwin.description.changes import from_toml, override
+from rigtwin.description.changes import override, with_changes
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.posterior import load_posterior
 from rigtwin.diagnosis.calibrated import toml
@@ -85,7 +85,7 @@ def test_the_document_has_every_field(explained):
 def test_the_corrected_twin_is_one_that_run_and_compare_take(explained, tmp_path):
     path = tmp_path / "twin.toml"
     path.write_text(toml(explained))
-    assert from_toml(Configuration(), path).plant == explained.corrected.plant
+    assert with_changes(Configuration(), path).plant == explained.corrected.plant
     assert "coulomb = " in toml(explained)
 
 

@@ -19,7 +19,6 @@ import rigtwin
 from controllers import Measurements
 from experiments import find
 from rigtwin.cli import main
-from rigtwin.description.changes import from_assignments
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq import CARD
 from rigtwin.hardware.daq.calibration import (
@@ -44,6 +43,7 @@ from rigtwin.recording import load
 from rigtwin.recording.recorded_test import transitions
 from rigtwin.system import monotonic
 from tests.helpers.described import NOISY, described
+from tests.helpers.settings import from_assignments
 
 TABLE = load_table(CARD)
 SHORT = ["--set", "timing.duration=1", "--set", "safety.ramp=0.3", "--set", "safety.hold=0.1"]

@@ -16,7 +16,6 @@ import pytest
 from controllers import update as healthy
 from experiments import find
 from rigtwin.cli import main
-from rigtwin.description.changes import from_assignments
 from rigtwin.errors import RigtwinError
 from rigtwin.hardware.daq import CARD
 from rigtwin.hardware.daq.table_file import load_table
@@ -33,6 +32,7 @@ from rigtwin.hardware.supervisor import COMPLETED, NEXT, Cause, Phase, Superviso
 from rigtwin.recording import load
 from rigtwin.recording.recorded_test import transitions
 from rigtwin.simulation.trip import Trip
+from tests.helpers.settings import from_assignments
 
 TABLE = load_table(CARD)
 HERE = [kind for kind in KINDS if kind.place != "process"]

@@ -19,7 +19,7 @@ from experiments.tuning import STUDIES, find_study
 from machines import DEFAULT_MACHINE
 from rigtwin.cli import main
 from rigtwin.description.catalogue import find
-from rigtwin.description.changes import from_toml, override
+from rigtwin.description.changes import override, with_changes
 from rigtwin.description.configuration import Configuration
 from rigtwin.description.posterior import Alternative, Posterior, format_toml, load_posterior
 from rigtwin.errors import RigtwinError
@@ -301,7 +301,7 @@ def write_twin(path: Path) -> Path:
 def test_a_posterior_is_read_as_it_was_written(tmp_path):
     assert load_posterior(write_twin(tmp_path / "c.toml")) == POSTERIOR
     # run and compare take the same file.
-    assert from_toml(Configuration(), tmp_path / "c.toml").plant.motor.coulomb == 24.0
+    assert with_changes(Configuration(), tmp_path / "c.toml").plant.motor.coulomb == 24.0
     (tmp_path / "plain.toml").write_text("[rail]\ncoulomb = 60\n")
     plain = load_posterior(tmp_path / "plain.toml")
     assert plain.intervals == {}
@@ -583,7 +583,7 @@ def test_a_study_from_end_to_end(tmp_path, capsys):
     # What was chosen is the best of those allowed, and better than what was begun with.
     with (out / "candidates.csv").open() as file:
         tried = [{key: float(value) for key, value in row.items()} for row in csv.DictReader(file)]
-    tuned = from_toml(experiment("active").configuration, out / "tuned.toml")
+    tuned = with_changes(experiment("active").configuration, out / "tuned.toml")
     chosen = tuned.controller.skyhook_damping
     least = min((row for row in tried if row["allowed"]), key=lambda row: row["ride"])
     assert chosen == least["controller.skyhook_damping"]

@@ -174,58 +174,10 @@ def parse_assignments(assignments: Sequence[str]) -> Iterator[dict[str, dict[str
         yield {group: {name: value.strip()}}
 
 
-def from_toml(configuration: Configuration, path: Path) -> Configuration:
-    """Return a configuration with the settings of a TOML file.
-
-    Parameters
-    ----------
-    configuration
-        Configuration to start from; it is not modified.
-    path
-        Path of the TOML file.
-
-    Returns
-    -------
-    Configuration
-        Copy with the settings.
-
-    Raises
-    ------
-    RigtwinError
-        If the file cannot be read or a setting is not allowed. The message names the file.
-    """
-    return read_toml(path, lambda tables: override(configuration, values_of(tables)))
-
-
 def values_of(tables: Mapping[str, Any]) -> dict[str, Any]:
     """Return the tables that hold settings: all but `posterior`, the uncertainty of a calibrated
     twin."""
     return {name: table for name, table in tables.items() if name != POSTERIOR}
-
-
-def from_assignments(configuration: Configuration, assignments: Sequence[str]) -> Configuration:
-    """Return a configuration with settings as `--set` takes them.
-
-    Parameters
-    ----------
-    configuration
-        Configuration to start from; it is not modified.
-    assignments
-        Texts of the form `group.name=value`. A later one replaces an earlier one.
-
-    Returns
-    -------
-    Configuration
-        Copy with the settings.
-
-    Raises
-    ------
-    RigtwinError
-        For a text of another form, or a key or value that is not allowed.
-    """
-    for changes in parse_assignments(assignments):
-        configuration = override(configuration, changes)
-    return configuration
 
 
 Changes = Mapping[str, Mapping[str, object]] | str | Path
@@ -256,7 +208,7 @@ def with_changes(
         For a key or value that is not allowed, or a file that cannot be read.
     """
     if isinstance(changes, str | Path):
-        return from_toml(configuration, Path(changes))
+        return read_toml(Path(changes), lambda tables: override(configuration, values_of(tables)))
     if isinstance(changes, Mapping):
         return override(configuration, changes)
     for change in changes:
