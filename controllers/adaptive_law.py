@@ -14,7 +14,7 @@ u and y pass the same filter, whose states are the derivatives. There are two es
   here, so the same Γ suits small and large motions.
 
 Both need start coefficients from a nominal actuator, and motion to learn from. Noise on r reaches
-the command amplified by θ_n T^−n. Noise on y reaches it slowly, through the coefficients.
+the command amplified as by the inverse model (`inverse_model`). Noise on y reaches it slowly, through the coefficients.
 """
 
 from __future__ import annotations
@@ -29,6 +29,8 @@ from controllers.derivatives import derivative_weights
 from controllers.state_filter import StateFilter, state_filter, step_filter
 
 Array = NDArray[np.float64]
+CORNER, SPAN = 30.0, 0.5
+"""Corner frequency of the filter, Hz, and largest relative change of a coefficient."""
 
 
 class AdaptiveLaw(NamedTuple):
@@ -71,10 +73,9 @@ class AdaptiveLaw(NamedTuple):
 def adaptive_time_series(
     coefficients: list[float],
     period: float,
-    corner: float = 30.0,
     window: float = 1.0,
     hold: float = 1e-6,
-    span: float = 0.5,
+    span: float = SPAN,
 ) -> AdaptiveLaw:
     """Return an adaptive inverse by least squares.
 
@@ -84,8 +85,6 @@ def adaptive_time_series(
         Initial coefficients, in s^order, lowest order first.
     period : float
         Period of the ticks, s.
-    corner : float
-        Corner frequency of the filter, Hz. Defaults to 30.
     window : float
         Time constant of the fading window, s. Defaults to 1.
     hold : float
@@ -93,17 +92,15 @@ def adaptive_time_series(
     span : float
         Largest relative change of a coefficient. Defaults to 0.5.
     """
-    law = _law(coefficients, period, corner, span)
+    law = _law(coefficients, period, span)
     return law._replace(least_squares=1.0, fading=float(np.exp(-period / window)), hold=hold)
 
 
 def adaptive_model(
     coefficients: list[float],
     period: float,
-    corner: float = 30.0,
     rate: float = 2.0,
     size: float = 1e-4,
-    span: float = 0.5,
 ) -> AdaptiveLaw:
     """Return an adaptive inverse by gradient.
 
@@ -113,22 +110,18 @@ def adaptive_model(
         Initial coefficients, in s^order, lowest order first.
     period : float
         Period of the ticks, s.
-    corner : float
-        Corner frequency of the filter, Hz. Defaults to 30.
     rate : float
         Adaptation gain Γ, 1/s. Defaults to 2.
     size : float
         Regularisation ν, m: motions below it adapt slowly. Defaults to 1e-4.
-    span : float
-        Largest relative change of a coefficient. Defaults to 0.5.
     """
-    return _law(coefficients, period, corner, span)._replace(rate=rate * period, size=size)
+    return _law(coefficients, period, SPAN)._replace(rate=rate * period, size=size)
 
 
-def _law(coefficients: list[float], period: float, corner: float, span: float) -> AdaptiveLaw:
+def _law(coefficients: list[float], period: float, span: float) -> AdaptiveLaw:
     """Return the parts that both estimators share."""
     order = len(coefficients)
-    motion_filter = state_filter(order, corner, period)
+    motion_filter = state_filter(order, CORNER, period)
     # In s^order the coefficients differ by decades; scaled by the corner they are of one size, and
     # one gain suits all.
     units = motion_filter.corner ** np.arange(order, dtype=np.float64)

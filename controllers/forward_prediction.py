@@ -4,8 +4,8 @@
 
 Horiuchi, Inoue, Konno, Namita: Real-time hybrid experimental system with actuator delay
 compensation, Earthquake Eng. Struct. Dyn. 28 (1999) 1121. There h is the delay itself and n = 3, so
-the weights are 4, −6, 4, −1. The law needs the delay alone. It amplifies white noise by √Σ a_i²,
-8.3 with those weights, and every motion above about 1/(6 h).
+the weights are 4, −6, 4, −1. The law needs only the delay. It amplifies white noise by √Σ a_i²,
+8.3 with those weights, and every motion above about 1/(9 h).
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ def forward_prediction(
 ) -> LinearLaw:
     """Return the law for a delay and a period, s.
 
-    degree: of the polynomial; interval: ticks between its samples, by default those of the delay.
+    degree: of the polynomial; interval: ticks between its samples, by default the delay in ticks.
     """
     ticks = interval or max(1, round(delay / period))
     weights = prediction_weights(delay / (ticks * period), degree + 1)

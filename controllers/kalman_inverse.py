@@ -71,11 +71,6 @@ class Weights(NamedTuple):
     state_noise: float = 1e-5
 
 
-def first_order(lag: float, delay: float) -> ActuatorDynamics:
-    """Return an actuator of unit gain with a lag and a delay, s, such as a diagnosis reports."""
-    return ActuatorDynamics(np.array([[-1.0 / lag]]), np.array([1.0 / lag]), np.array([1.0]), delay)
-
-
 def sampled_actuator(actuator: ActuatorDynamics, period: float) -> tuple[Array, Array, Array]:
     """Return A, B and C at a period, s, with the command held.
 

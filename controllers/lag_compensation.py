@@ -1,10 +1,10 @@
 """Linear lag compensation: the inverse of one first-order lag.
 
-    u = (τ s + 1)/(τ s/N + 1) r,   bilinear
+    u = (τ s + 1)/(τ s/N + 1) r,   discretised by the bilinear (Tustin) transform
 
 Zhao, French, Shield, Posbergh: Considerations for the development of real-time dynamic testing
-using servo-hydraulic actuation, Earthquake Eng. Struct. Dyn. 32 (2003) 1773. The law needs the lag
-alone. It amplifies high frequencies, and noise with them, up to N times.
+using servo-hydraulic actuation, Earthquake Eng. Struct. Dyn. 32 (2003) 1773. The law needs only the
+lag. It amplifies high frequencies, and noise with them, up to N times.
 """
 
 from __future__ import annotations

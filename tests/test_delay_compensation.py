@@ -17,13 +17,24 @@ from controllers.adaptive_law import (
 from controllers.derivatives import derivative_weights, prediction_weights
 from controllers.forward_prediction import forward_prediction
 from controllers.inverse_model import inverse_coefficients, inverse_model
-from controllers.kalman_inverse import Weights, first_order, kalman_inverse, sampled_actuator
+from controllers.kalman_inverse import (
+    ActuatorDynamics,
+    Weights,
+    kalman_inverse,
+    sampled_actuator,
+)
 from controllers.lag_compensation import lag_compensation
-from controllers.linear_law import LinearLaw, noise_gain, pass_through, response, step_linear
+from controllers.linear_law import LinearLaw, pass_through, step_linear
 from controllers.smith_predictor import smith_predictor
 from controllers.state_filter import state_filter, step_filter
+from tests.helpers.linear_law import noise_gain, response
 
 PERIOD = 1e-3
+
+
+def first_order(lag: float, delay: float) -> ActuatorDynamics:
+    """Return an actuator of unit gain with a lag and a delay, s, such as a diagnosis reports."""
+    return ActuatorDynamics(np.array([[-1.0 / lag]]), np.array([1.0 / lag]), np.array([1.0]), delay)
 
 
 def commands(law: LinearLaw, desired: np.ndarray, measured: np.ndarray) -> np.ndarray:
@@ -158,7 +169,7 @@ def test_the_filters_states_are_derivatives(corner):
 @pytest.mark.parametrize("make", [adaptive_time_series, adaptive_model])
 def test_an_adaptive_inverse_finds_the_lag_of_its_actuator(make):
     lag, start = 0.03, [1.0, 0.02]
-    law = make(start, PERIOD, corner=8.0)
+    law = make(start, PERIOD)
     memory, position, decay = adaptive_memory(law), 0.0, math.exp(-PERIOD / lag)
     for tick in range(20000):
         time = tick * PERIOD

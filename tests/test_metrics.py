@@ -9,8 +9,9 @@ from experiments.thesis.trial import trial
 from experiments.thesis.validation import TABLE_3_5
 from rigtwin.description.settings import Timing
 from rigtwin.recording import load
-from rigtwin.simulation.metrics import compute_tracking, tracking_of
+from rigtwin.simulation.metrics import compute_tracking
 from rigtwin.simulation.runner import record
+from tests.helpers.tracking import tracking_of
 
 
 @pytest.mark.slow

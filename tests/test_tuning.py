@@ -45,6 +45,7 @@ from rigtwin.studies.tuning.search import find_best, find_front
 from rigtwin.studies.tuning.study import Constraint, Study
 from rigtwin.studies.tuning.study_file import parse_study
 from tests.helpers.browser import BROWSER, looked_at
+from tests.helpers.tracking import tracking_of
 
 SMALL = """
 title = "a small study"
@@ -165,7 +166,6 @@ def test_a_run_that_trips_has_no_measures():
 
 
 def test_errors_are_those_of_the_thesis_tables():
-    from rigtwin.simulation.metrics import tracking_of
     from rigtwin.simulation.runner import record
 
     configuration = override(Configuration(), {"timing": {"duration": 3.0}})

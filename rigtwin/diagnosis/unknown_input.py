@@ -148,7 +148,7 @@ class _Disturbance:
 
 
 def locate_disturbance(
-    evidence: Evidence, plant: Plant, effects: Sequence[Effect] = (), follow: bool = True
+    evidence: Evidence, plant: Plant, effects: Sequence[Effect] = ()
 ) -> tuple[DisturbanceFit, ...]:
     """Fit an unknown input at every component in turn.
 
@@ -160,8 +160,6 @@ def locate_disturbance(
         Plant with the effects that are known already.
     effects
         These effects. Their tolerances are no longer free.
-    follow
-        Whether the foremost components are fitted iteratively, as large inputs need. Default True.
 
     Returns
     -------
@@ -178,13 +176,12 @@ def locate_disturbance(
             threads.map(lambda disturbance: _fit_component(disturbance, space, 1), disturbances),
             key=lambda fit: fit.misfit,
         )
-        if follow:
-            foremost = [fit.component for fit in fits[:FOLLOWED]]
-            refined = threads.map(
-                lambda disturbance: _fit_component(disturbance, space, ROUNDS),
-                [each for each in disturbances if each.component in foremost],
-            )
-            fits = sorted([*refined, *fits[FOLLOWED:]], key=lambda fit: fit.misfit)
+        foremost = [fit.component for fit in fits[:FOLLOWED]]
+        refined = threads.map(
+            lambda disturbance: _fit_component(disturbance, space, ROUNDS),
+            [each for each in disturbances if each.component in foremost],
+        )
+        fits = sorted([*refined, *fits[FOLLOWED:]], key=lambda fit: fit.misfit)
     return tuple(fits)
 
 

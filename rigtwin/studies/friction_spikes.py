@@ -86,7 +86,7 @@ class Calibration:
         return "\n".join(["[controller]", compensator, *values]) + "\n"
 
 
-def find_compensator(recording: RecordedTest, settings: Settings, seed: int = 0) -> Calibration:
+def find_compensator(recording: RecordedTest, settings: Settings) -> Calibration:
     """Identify the compensator's settings from a recording made without compensation.
 
     Parameters
@@ -95,8 +95,6 @@ def find_compensator(recording: RecordedTest, settings: Settings, seed: int = 0)
         Recording made without compensation.
     settings
         Settings of the controller that made the recording.
-    seed
-        Seed of the search.
 
     Returns
     -------
@@ -128,7 +126,7 @@ def find_compensator(recording: RecordedTest, settings: Settings, seed: int = 0)
     close_loop(base, False, test, due, steps)
     test = test._replace(rest=errors - due)
 
-    best = _search_settings(base, test, seed)
+    best = _search_settings(base, test)
     close_loop(best, True, test, due, steps)
     # The search minimises the force error alone; detections and false steps only describe the
     # result.
@@ -145,7 +143,7 @@ def find_compensator(recording: RecordedTest, settings: Settings, seed: int = 0)
     )
 
 
-def _search_settings(base: Settings, test: ForceTest, seed: int) -> Settings:
+def _search_settings(base: Settings, test: ForceTest) -> Settings:
     """Return the settings within BOUNDS whose compensator leaves the least force error."""
     # scipy.optimize is imported here because it takes long to load.
     from scipy.optimize import differential_evolution
@@ -168,7 +166,7 @@ def _search_settings(base: Settings, test: ForceTest, seed: int) -> Settings:
         maxiter=25,
         tol=1e-3,
         polish=False,
-        rng=np.random.default_rng(seed),
+        rng=np.random.default_rng(0),
     )
     return set_values(np.asarray(optimum.x))
 

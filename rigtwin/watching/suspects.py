@@ -9,7 +9,7 @@ from rigtwin.diagnosis.explain import candidates
 from rigtwin.diagnosis.fit import Fit
 from rigtwin.diagnosis.fitter import Fitter
 from rigtwin.diagnosis.threads import Threads
-from rigtwin.diagnosis.thresholds import STANDARD, Thresholds
+from rigtwin.diagnosis.thresholds import STANDARD
 from rigtwin.watching.alarm import Suspect
 
 FITTED = 12
@@ -22,15 +22,13 @@ WORTH = 0.02
 """Smallest probability of a suspect."""
 
 
-def find_suspects(evidence: Evidence, thresholds: Thresholds = STANDARD) -> tuple[Suspect, ...]:
+def find_suspects(evidence: Evidence) -> tuple[Suspect, ...]:
     """Return the effects that may cause a gap, if the cause is one effect of the library.
 
     Parameters
     ----------
     evidence
         Evidence in which only the ticks of the gap count.
-    thresholds
-        Thresholds of the diagnosis.
 
     Returns
     -------
@@ -40,7 +38,7 @@ def find_suspects(evidence: Evidence, thresholds: Thresholds = STANDARD) -> tupl
     # Accuracy is traded for speed: the test is still running.
     searched = evidence.thin().halve_steps()
     # An effect must lower χ² by twice the nats of its prior, as where only noise remains.
-    price = 2.0 * (thresholds.occam_quiet + thresholds.materiality * evidence.expected)
+    price = 2.0 * (STANDARD.occam_quiet + STANDARD.materiality * evidence.expected)
     fitter, least = Fitter(searched), price
     without = fitter.nominal_fit
     with Threads() as threads:
@@ -55,7 +53,7 @@ def find_suspects(evidence: Evidence, thresholds: Thresholds = STANDARD) -> tupl
     # A misfit that even the best fit leaves means that the model is wrong; then differences of the
     # misfit prove less, and the weights exp(−χ²/2) are tempered.
     remaining = max(min(fit.misfit for fit in fits) - evidence.expected, 0.0)
-    temper = thresholds.temper + TEMPERED * remaining
+    temper = STANDARD.temper + TEMPERED * remaining
     # Bounded by exp(−700), which is still a double above 0.
     weights = np.exp(-np.minimum((costs - costs.min()) / (2.0 * temper), 700.0))
     weights /= weights.sum()
@@ -65,7 +63,7 @@ def find_suspects(evidence: Evidence, thresholds: Thresholds = STANDARD) -> tupl
             # No probability is certain: causes outside the library have a share too.
             fit,
             (without.misfit - fit.misfit) / gap,
-            thresholds.highest_confidence * float(weight),
+            STANDARD.highest_confidence * float(weight),
         )
         for fit, weight in zip(fits, weights, strict=True)
     ]

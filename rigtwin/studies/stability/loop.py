@@ -115,11 +115,6 @@ def roots(coefficients: np.ndarray) -> Roots:
     return np.linalg.eigvals(companions).astype(complex)
 
 
-def lag_roots(loop: Loop, lag: float) -> Roots:
-    """Return the poles of a loop with lags, the lag in s."""
-    return roots(lag_polynomial(loop, lag).coef)
-
-
 def bound(loop: Loop) -> float:
     """Return a bound on the magnitude of all unstable roots, in 1/s.
 
