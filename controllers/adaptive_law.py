@@ -14,7 +14,8 @@ u and y pass the same filter, whose states are the derivatives. There are two es
   here, so the same Γ suits small and large motions.
 
 Both need start coefficients from a nominal actuator, and motion to learn from. Noise on r reaches
-the command amplified as by the inverse model (`inverse_model`). Noise on y reaches it slowly, through the coefficients.
+the command amplified as by the inverse model (`inverse_model`). Noise on y reaches it slowly,
+through the coefficients.
 """
 
 from __future__ import annotations

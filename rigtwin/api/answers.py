@@ -1,4 +1,4 @@
-"""Questions to recordings: diagnosis, changes, calibration."""
+"""Questions about recordings: diagnosis, changes, calibration."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from pathlib import Path
 
 from rigtwin.api.diagnosis_data import Recorded, as_list, has_duplicate, read_data
 from rigtwin.api.machines import described_machine, machine_of
-from rigtwin.api.other_answers import look_otherwise
+from rigtwin.api.other_answers import reinterpret_logs
 from rigtwin.api.recordings import resolve_recording
 from rigtwin.api.twin import Settings, names_of, require_unrecorded, twin_of
 from rigtwin.description.machine import Machine
 from rigtwin.diagnosis.change import Changes
 from rigtwin.diagnosis.changes import find_changes
 from rigtwin.diagnosis.data_checks import require_fit
-from rigtwin.diagnosis.diagnose import diagnose as find_reasons
+from rigtwin.diagnosis.diagnose import diagnose as diagnose_machine
 from rigtwin.diagnosis.first_look import FirstLook as FirstLook
 from rigtwin.diagnosis.result import Diagnosis
 from rigtwin.diagnosis.thresholds import STANDARD
@@ -72,9 +72,10 @@ def diagnose(
         Function called with the name of a stage and the number of steps since its last call.
     first_look
         Function called after a second or two with a `FirstLook`: the gap of each sensor and the
-        effects that may cause it. The diagnosis continues meanwhile.
+        effects that may cause it. The diagnosis continues meanwhile. It is called once for each
+        joint of a machine whose joints do not act on each other.
     columns, test
-        Statements about a log as `describe` takes them. They require a model as the machine.
+        Column assignments and kind of test, as for `describe`. They require a model as the machine.
     effort
         Processor time after which the search tries no further hypothesis, s. It is estimated from
         the integration steps, so that the answer does not depend on the computer.
@@ -91,8 +92,8 @@ def diagnose(
     Raises
     ------
     RigtwinError
-        If there is no recording, one is named twice, its settings are unknown, or held-out data
-        are unfit for a comparison.
+        If there is no recording, a recording is given twice, the settings of a recording are
+        unknown, or held-out data are unfit for a comparison.
 
     Examples
     --------
@@ -111,7 +112,7 @@ def diagnose(
     base = twin_of(described, settings, without)
     tests = [find_experiment(described, name) for name in described.next_tests]
     thresholds = replace(STANDARD, effort=effort)
-    diagnosis = find_reasons(
+    diagnosis = diagnose_machine(
         described,
         data.recordings,
         base,
@@ -121,10 +122,10 @@ def diagnose(
         thresholds=thresholds,
         first_look=first_look,
     )
-    # Settings and exclusions name components, which another view does not have.
+    # Settings and exclusions refer to components that do not exist in another kind of test.
     if settings or without or exclude:
         return diagnosis
-    return look_otherwise(diagnosis, data, thresholds, progress)
+    return reinterpret_logs(diagnosis, data, thresholds, progress)
 
 
 def what_changed(

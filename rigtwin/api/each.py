@@ -25,8 +25,8 @@ from rigtwin.system import return_memory
 STORE, TABLE = "answers.sqlite", "answers.json"
 """Files in the folder of the answers: the finished jobs, and all answers together."""
 _PLACEHOLDER = "the-recording-that-is-diagnosed"
-"""Text in a stored answer in place of the recording's path. Answers are stored by content, and the
-same recording may have copies of other names."""
+"""Text in a stored answer in place of the recording's path. Answers are keyed by file content;
+copies of a recording may have different file names."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ class _Job:
     Attributes
     ----------
     data : bytes
-        Content of the recording's file, which a worker on another computer cannot read.
+        Content of the recording file. A worker on another computer has no access to the file.
     machine : str
         Name of a shipped machine, or the path of a description.
     settings, without
@@ -78,7 +78,6 @@ class _Job:
 def _answer(job: _Job) -> dict[str, Any]:
     """Diagnose one recording. Runs in a worker process."""
     with TemporaryDirectory(prefix="rigtwin-") as folder:
-        # The job carries the content, since workers on other computers do not have the file.
         path = Path(folder) / _PLACEHOLDER
         path.write_bytes(job.data)
         try:
@@ -92,7 +91,7 @@ def _answer(job: _Job) -> dict[str, Any]:
             # Without this, the process grows by several MB per recording.
             return_memory()
     text = json.dumps(finite(document), allow_nan=False)
-    # Without its quotes, the path as JSON writes it: backslashes of Windows are doubled there.
+    # Strip the quotes from the JSON-encoded path: JSON doubles the backslashes of Windows.
     return {"answer": text.replace(json.dumps(str(path))[1:-1], _PLACEHOLDER)}
 
 
@@ -117,11 +116,11 @@ def diagnose_each(
     recordings
         Paths of the recordings.
     folder
-        Folder of the answers. Its `answers.json` has all answers by the recordings' paths.
+        Folder of the answers. Its `answers.json` maps each recording's path to its answer.
     machine
         Machine of all recordings, or its name, or the path of its description. Defaults to the
-        one named in the recording. Workers of a cluster need a description that is not shipped at
-        the same path.
+        one named in the recording. If the description is not a shipped one, every worker of a
+        cluster must find it at the same path.
     settings, without
         Changes of the twin and effects removed from it, see `diagnose`.
     workers, cluster
@@ -157,7 +156,7 @@ def diagnose_each(
 
 
 def _write_table(path: Path, answers: Sequence[Answered]) -> None:
-    """Write all answers by the recordings' paths."""
+    """Write a table that maps each recording's path to its answer."""
     table = {
         str(answer.path): {"error": answer.error} if answer.document is None else answer.document
         for answer in answers

@@ -54,7 +54,7 @@ def resolve_machine(machine: Machine | str | Path) -> Machine:
     Raises
     ------
     RigtwinError
-        If the argument has another type, and where `machine` raises it.
+        If the argument has another type, or as for `machine`.
     """
     if isinstance(machine, Machine):
         return machine
@@ -85,7 +85,7 @@ def machine_of(recording: reader.RecordedTest) -> Machine:
     RigtwinError
         If none of these exists, so that the machine has to be stated.
     """
-    # Only recordings of this API carry a machine; those of the reader below it do not.
+    # Only `rigtwin.Recording` carries a machine; `RecordedTest` of the layer below does not.
     described = getattr(recording, "described", None)
     if described is not None:
         return described
@@ -101,7 +101,7 @@ def machine_of(recording: reader.RecordedTest) -> Machine:
     elif description is not None:
         why = f"but its description {description} does not exist any more"
     else:
-        why = f"which is none of the shipped ones, {', '.join(catalogue.shipped())}"
+        why = f"which is not shipped with rigtwin; shipped are {', '.join(catalogue.shipped())}"
     raise RigtwinError(
         f"{recording.path}: it is of machine {recording.machine!r}, {why}; "
         'give its description, machine="F.toml" or --machine F.toml'

@@ -18,7 +18,7 @@ from rigtwin.api.recordings import Origin, Recording
 from rigtwin.describing.other_view import DRIVES, VIEWS, describe_otherwise
 from rigtwin.description.implied import FORCES, INVERSE, SERVOS
 from rigtwin.description.machine import Machine
-from rigtwin.diagnosis.diagnose import diagnose as find_reasons
+from rigtwin.diagnosis.diagnose import diagnose as diagnose_machine
 from rigtwin.diagnosis.evidence import Evidence, relative_errors
 from rigtwin.diagnosis.result import Diagnosis
 from rigtwin.diagnosis.thresholds import Thresholds
@@ -64,7 +64,7 @@ class Attempt:
     reason: str
 
 
-def look_otherwise(
+def reinterpret_logs(
     diagnosis: Diagnosis,
     data: DiagnosisData,
     thresholds: Thresholds,
@@ -89,7 +89,7 @@ def look_otherwise(
         return _judge_drives(diagnosis, data, thresholds, progress)
     closed = _closed_share(diagnosis)
     for attempt in _attempts(data, closed):
-        other = find_reasons(
+        other = diagnose_machine(
             attempt.data.machine,
             attempt.data.recordings,
             None,
@@ -124,7 +124,7 @@ def _judge_drives(
     other = _record_again(seen.machine, record_again(seen, logs), data)
     # What a reference does that is no command of these servos cannot be explained, however long.
     brief = replace(thresholds, effort=min(thresholds.effort, DRIVE_EFFORT))
-    drives = find_reasons(
+    drives = diagnose_machine(
         other.machine,
         other.recordings,
         None,

@@ -104,7 +104,7 @@ def run(
     _check_onset(effects_from, bool(effects), described, configuration)
 
     def record(target: Path) -> None:
-        on_twin = TwinTest(
+        twin_test = TwinTest(
             experiment=test.name,
             configuration=configuration,
             demands=test.demands(configuration, seed),
@@ -113,13 +113,13 @@ def run(
             effects_from=effects_from,
             controller=getattr(controller, "tick", controller),
         )
-        described.physics.record(target, described, on_twin, progress)
+        described.physics.record(target, described, twin_test, progress)
 
     if path is not None:
         record(recordable(forbid_overwriting(path, *described.files)))
         return with_machine(reader.load(Path(path)), described)
-    # The writer needs a file. A recording in memory has read all of it before the folder goes, and
-    # keeps the name alone.
+    # The writer needs a file. The recording is loaded completely before the folder is deleted, and
+    # keeps only the name of the file.
     with TemporaryDirectory(prefix="rigtwin-") as folder:
         file = Path(folder) / f"{test.name}-{seed}.mcap"
         record(file)

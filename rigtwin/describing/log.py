@@ -20,7 +20,7 @@ from rigtwin.importing.units import unit_of
 from rigtwin.numerics.arrays import Array
 
 STATED = "as stated"
-"""Reason of a signal whose source the owner of the log states."""
+"""Reason of a signal whose source the user states (`--column`)."""
 
 
 def bridge(values: Array) -> Array:
@@ -51,7 +51,7 @@ class Log:
     columns
         Columns of the log.
     stated
-        Statements of the log's owner.
+        Statements of the user about the log.
     slots
         Columns that are offered for the joints.
     clock
@@ -86,15 +86,17 @@ class Log:
         return unit_of(self.clock.unit)[1] * self.columns.values[self.clock.column]
 
     def values(self, signal: LogSignal) -> Array:
-        """Values of a signal in SI, shape (rows,); cells that hold no number are bridged."""
+        """Values of a signal, shape (rows,): in SI, or in the unit of an actuator's control.
+
+        Cells that hold no number are bridged.
+        """
         period = self.clock.period if self.clock is not None else 1.0
         if signal.formula:
             formula = read_formula(signal.formula, self.columns.values)
             values = formula_values(formula, self.columns, period, signal.key)
         else:
             try:
-                # A command can be in the unit of an actuator's control, which is none of the known
-                # units.
+                # The unit of an actuator's control may not be in the table of units.
                 factor = unit_of(signal.unit)[1]
             except RigtwinError:
                 factor = 1.0
@@ -105,7 +107,7 @@ class Log:
         return signal.sign * signal.scale * bridge(values)
 
     def stated_signal(self, joint: str, quantity: JointQuantity) -> LogSignal:
-        """The signal of a slot whose source the owner of the log states."""
+        """The signal of a slot whose source the user states."""
         source = self.slots.stated(joint, quantity)
         assert source is not None
         si = SI[JointQuantity.POSITION if quantity is JointQuantity.COMMAND else quantity]
@@ -115,7 +117,7 @@ class Log:
             unit = self.columns.units.get(source.column, "")
             if not unit:
                 unit = si[self.mechanism.turns(joint)]
-                assumed = (f"{unit}, as nothing states another unit",)
+                assumed = (f"{unit}, as no unit is given",)
         return LogSignal(
             joint=joint,
             quantity=quantity,

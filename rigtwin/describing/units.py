@@ -318,7 +318,7 @@ def force_unit(mechanism: Mechanism, columns: Columns, column: str, joint: str) 
             text = f"{written}, times the gear of the model's actuator, {gear:g} {si}/{other}"
             return Unit(written, text, gear)
     known = known_unit(columns, column, si, f"{joint}.force")
-    return known or Unit(si, f"{si}, as nothing states another unit")
+    return known or Unit(si, f"{si}, as no unit is given")
 
 
 def actuator_constant(mechanism: Mechanism, actuator: str) -> float:

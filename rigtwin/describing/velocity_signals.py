@@ -95,7 +95,7 @@ def _unit(log: Log, joint: str, column: str) -> Unit:
         return known
     largest = float(np.nanmax(np.abs(log.columns.values[column]), initial=0.0))
     if largest <= SURELY_SI:
-        return Unit(si, f"{si}, as nothing states another unit")
+        return Unit(si, f"{si}, as no unit is given")
     others = ("rpm", "deg/s") if turns else ("mm/s",)
     raise ask(
         f"column {column!r} reaches {largest:.4g}; in what unit is it?",

@@ -422,4 +422,7 @@ def find_physics(types: Mapping[str, type], replays: Sequence[ReplayOf]) -> Phys
 
 def physics_named(name: str) -> Physics:
     """Return the kind with a name, as `Physics.name` states it."""
-    return next(kind for kind in _kinds() if kind.name == name)
+    for kind in _kinds():
+        if kind.name == name:
+            return kind
+    raise RigtwinError(f"machine kind {name!r} is not registered here; call physics.register first")

@@ -22,7 +22,7 @@ TIMESTAMP = "timestamp"
 
 
 def read_dataset(path: Path, selection: Selection) -> Columns:
-    """Read the needed columns of all episodes, or of those that are needed.
+    """Read the needed columns of a data set.
 
     Parameters
     ----------
@@ -34,7 +34,8 @@ def read_dataset(path: Path, selection: Selection) -> Columns:
     Returns
     -------
     Columns
-        Rows of all episodes one after another. Lists are named as `meta/info.json` does.
+        Rows of all episodes one after another; of version 2, those of the needed episodes. Items of
+        list columns are named as in `meta/info.json`.
 
     Raises
     ------
@@ -61,13 +62,13 @@ def read_dataset(path: Path, selection: Selection) -> Columns:
 
 
 def _data_files(path: Path, episodes: Sequence[int]) -> list[Path]:
-    """Return the files of the rows, of v2 only those of the needed episodes."""
+    """Return the data files; of version 2, those of the requested episodes."""
     files = sorted((path / "data").rglob("*.parquet"))
     numbered = {file.stem: file for file in files if file.stem.startswith("episode_")}
-    # Version 2 has one file an episode, version 3 many episodes in one file.
+    # Version 2 has one file per episode, version 3 many episodes in one file.
     if episodes and len(numbered) == len(files):
         named = [numbered.get(f"episode_{number:06d}") for number in episodes]
-        # Without one of them, the numbers of all files say which episodes there are.
+        # If a requested episode has no file, all files let the caller list those that exist.
         if None not in named:
             return [file for file in named if file is not None]
     return files

@@ -34,10 +34,10 @@ if TYPE_CHECKING:
     from rigtwin.simulation.runner import RunResult
     from rigtwin.studies.tuning.run import Run
 
-LATE_TO_COMMAND = 1e-3
-"""Largest sampling delay of a signal that answers to a command, s."""
-SPARSE = 4e-3
-"""Least period of made-up motions where nothing is integrated from tick to tick, s."""
+LONGEST_DELAY = 1e-3
+"""Upper bound on the sampling delay of a sensor that responds to a command, s."""
+EXCITATION_PERIOD = 4e-3
+"""Shortest sampling period of synthetic excitation for models without integration over time, s."""
 
 
 # Imports within the methods keep the start of a command fast: each needs few of these packages.
@@ -46,9 +46,9 @@ class IndependentJoints(Physics):
 
     name = "independent joints"
     title = "a machine of joints that do not act on each other"
-    longest_delay = LATE_TO_COMMAND
+    longest_delay = LONGEST_DELAY
     least_period: ClassVar[float] = 0.0
-    """Least period of made-up motions, s."""
+    """Shortest sampling period of synthetic excitation, s."""
 
     def claims(self, types: Mapping[str, type], replays: Sequence[ReplayOf]) -> bool:
         return True
@@ -82,7 +82,7 @@ class IndependentJoints(Physics):
         joints = [
             JointModel(machine, replay, inputs, configuration, steps) for replay in machine.replays
         ]
-        # One joint needs no numbering of its disturbances.
+        # A single joint needs no index for its disturbances.
         return joints[0] if len(joints) == 1 else IndependentModel(joints)
 
     def record(
@@ -94,7 +94,7 @@ class IndependentJoints(Physics):
     ) -> RunResult:
         from rigtwin.models.machine_twin import run_machine
 
-        return run_machine(
+        result = run_machine(
             path,
             machine,
             test.experiment,
@@ -104,6 +104,9 @@ class IndependentJoints(Physics):
             effects=test.effects,
             controller=test.controller,
         )
+        # The whole test is simulated in one piece.
+        progress(result.ticks)
+        return result
 
     def simulate(
         self, machine: Machine, name: str, configuration: Configuration, demands: Any, seed: int
@@ -219,10 +222,10 @@ class PrescribedJoints(IndependentJoints):
 
     name = "prescribed joints"
     title = "a machine of joints that act on each other, each moved as measured"
-    # Inverse dynamics needs the same forces either way.
+    # Inverse dynamics gives the same forces when time is reversed.
     reversible = True
     lacks_stops = True
-    least_period = SPARSE
+    least_period = EXCITATION_PERIOD
 
     def claims(self, types: Mapping[str, type], replays: Sequence[ReplayOf]) -> bool:
         return any(len(replay.moved_by) > 1 and not replay.free for replay in replays)
@@ -252,7 +255,7 @@ class FreeJoints(PrescribedJoints):
     title = "a machine of joints that act on each other, some of them free to move"
     reversible = False
     compounds = True
-    longest_delay = LATE_TO_COMMAND
+    longest_delay = LONGEST_DELAY
     least_period = 0.0
 
     def claims(self, types: Mapping[str, type], replays: Sequence[ReplayOf]) -> bool:

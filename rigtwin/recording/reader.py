@@ -49,7 +49,7 @@ def load(path: Path) -> RecordedTest:
 
     Returns
     -------
-    Recording
+    RecordedTest
         Everything that can be read.
 
     Raises
@@ -155,7 +155,7 @@ class FileContent:
 
         Returns
         -------
-        Recording
+        RecordedTest
             Recording of all ticks that were added and not dropped.
 
         Raises

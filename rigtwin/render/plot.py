@@ -50,7 +50,7 @@ def find_stretch(recording: RecordedTest, start: float, until: float | None) -> 
 
     Parameters
     ----------
-    recording : Recording
+    recording : RecordedTest
         Recording that contains the stretch.
     start, until : float
         Times in s. The stretch reaches to the end if `until` is None.
@@ -94,7 +94,7 @@ def draw(
 
     Parameters
     ----------
-    recording : Recording
+    recording : RecordedTest
         Recording of any machine.
     out : Path
         Path of a png, svg or pdf file.

@@ -55,7 +55,7 @@ def film(
 
     Parameters
     ----------
-    recording : Recording
+    recording : RecordedTest
         Recording of any machine.
     out : Path
         Path of an mp4 file.

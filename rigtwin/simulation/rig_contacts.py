@@ -53,7 +53,7 @@ def contacts(plant: RigPlant, carriage: float, travel: float, preload: float) ->
 
     Returns
     -------
-    Contacts
+    RigContacts
         Contacts with new states.
     """
     rail, motor, tyre = friction(plant.rail), friction(plant.motor), plant.tyre

@@ -42,7 +42,7 @@ class Actions(Protocol):
 
         Returns
         -------
-        tuple of State and Commands
+        tuple of MilState and Commands
             State of the controller after the tick, and the commands for the actuators.
         """
         ...
@@ -121,7 +121,7 @@ def suspension(settings: Settings) -> ActionSchedule:
 
     Returns
     -------
-    Schedule
+    ActionSchedule
         Bounds of the suspension's damping, in Ns/m, from 0.2 to 10 times its present value, and
         of its preload, in N, from 0.5 to 1.5 times.
     """

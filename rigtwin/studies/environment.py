@@ -2,7 +2,7 @@
 
 An episode is one test of an experiment. Each episode uses the next seed, and with it a new road and
 new sensor noise. A tripped safety limit ends the episode with discount 0 and a penalty; the test's
-end has discount 1. A `Schedule` held at `rest` reproduces the experiment bit for bit.
+end has discount 1. An `ActionSchedule` held at `rest` reproduces the experiment bit for bit.
 `experiments.environment` creates an environment by name::
 
     env = environment("active")    # the agent sets the suspension's damping and preload every 10 ms

@@ -24,7 +24,7 @@ def mend(recording: RecordedTest) -> tuple[RecordedTest, NDArray[np.bool_]]:
 
     Returns
     -------
-    tuple of Recording and array
+    tuple of RecordedTest and array
         Recording after its last long gap, without missing ticks, and whether each tick was
         recorded, shape (ticks,). In filled ticks, commands are held and signals interpolated.
     """

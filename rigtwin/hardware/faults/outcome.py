@@ -84,7 +84,7 @@ def judge(fault: InjectedFault, test: Test, bench: FaultyBench, path: Path) -> F
 
     Parameters
     ----------
-    fault : Fault
+    fault : InjectedFault
         Fault of the session.
     test : Test
         Test of the session.
