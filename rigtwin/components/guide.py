@@ -81,7 +81,7 @@ class Guide(NamedTuple):
     # Coulomb friction, viscous friction and spring: the MJCF has values for these.
     coulomb: Annotated[float, Quantity("N", 0.0, 1e7, MJCF)] = 0.0
     viscous: Annotated[float, Quantity("Ns/m", 0.0, 1e9, MJCF)] = 0.0
-    stiffness: Annotated[float, Quantity("N/m", 0.0, 1e12, MJCF)] = 0.0
+    stiffness: Annotated[float, Quantity("N/m", -1e12, 1e12, MJCF)] = 0.0
     slack: Annotated[float, Quantity("m", 0.0, 10.0, MJCF)] = 0.0
     stribeck: Annotated[float, Quantity("N", -1e7, 1e7, NONE)] = 0.0
     stribeck_velocity: Annotated[
