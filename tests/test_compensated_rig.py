@@ -19,7 +19,7 @@ from controllers import (
 )
 from controllers.closed_loop import ClosedLoop, transfer, with_lag
 from controllers.kalman_inverse import ActuatorDynamics, sampled_actuator
-from controllers.linear_law import pass_through, response
+from controllers.linear_law import pass_through
 from controllers.plate import cylinder_model, plate
 from experiments import find
 from experiments.vehicles import VEHICLES, configuration
@@ -39,6 +39,7 @@ from rigtwin.studies.stability.compensated import (
     with_filters,
 )
 from rigtwin.studies.stability.sampled_loop import decay
+from tests.helpers.linear_law import response
 
 PERIOD, FAST, LATE = 1e-3, 2e-3, 8e-3
 

@@ -110,11 +110,13 @@ def test_columns_that_only_one_joint_can_own_are_matched(tmp_path: Path, names: 
     stated = {"slider.command": "F"} if names[0] == "F" else {}
     log = write_log(tmp_path / "log.csv", columns)
     answer = rigtwin.describe(tmp_path / "model.xml", log, columns=stated)
-    assert answer.reading.kind.test == "force commands"
+    # The cart's force is commanded, and nothing drives the pole.
+    assert answer.reading.kind.test == "inverse dynamics"
     assert {signal.key: signal.source for signal in answer.reading.signals} == {
         "slider.position": names[1],
         "hinge.position": names[2],
-        "slider.command": names[0],
+        "slider.force": names[0],
+        "hinge.force": "0",
     }
 
 

@@ -105,7 +105,7 @@ def test_the_spring_between_two_joints_may_be_another(tmp_path: Path) -> None:
     time, (motor, load), _ = motion(8)
     columns = {"time": time, "drive_cmd": motor, "motor_pos": motor, "load_pos": load}
     described = rigtwin.describe(tmp_path / "shaft.xml", write_log(tmp_path / "log.csv", columns))
-    assert described.reading.kind.test == "force commands"
+    assert described.reading.kind.test == "inverse dynamics"
     names = {effect.kind.name for effect in described.machine.effects() if effect.group == "shaft"}
     assert names == {"coulomb", "viscous", "stiffness", "cubic_stiffness", "slack"}
 

@@ -22,6 +22,8 @@ EDGE = 0.05
 """Share of the rows at either end that does not count."""
 EXPLAINED = 0.25
 """Share of a force's variance that its inertia and gravity must explain to show its sign."""
+MOVING = 0.2
+"""Share of the highest speed from which a joint moves."""
 MAGNITUDE_REVERSALS = 4
 """Reversals of a joint after which a force that never changes its sign is a magnitude."""
 POWER, HARMONICS = 0.9, 8.0
@@ -63,6 +65,20 @@ def is_magnitude(force: Array, position: Array) -> bool:
         if high > 0.0 and low == 0.0 and _reversals(position) >= MAGNITUDE_REVERSALS:
             return True
     return False
+
+
+def unforced_share(force: Array, position: Array) -> float:
+    """Return the share of a joint's motion in which its force is zero, as after a push by hand.
+
+    Parameters
+    ----------
+    force, position
+        Shape (rows,).
+    """
+    reach = max(len(position) // 200, 1)
+    speed = np.abs(position[2 * reach :] - position[: -2 * reach])
+    moving = speed > MOVING * np.max(speed)
+    return float(np.mean(force[reach:-reach][moving] == 0.0)) if moving.any() else 0.0
 
 
 def _reversals(position: Array) -> int:

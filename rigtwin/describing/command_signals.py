@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -188,21 +188,26 @@ def commanded_force(log: Log, joint: str) -> LogSignal | None:
     return force if _is_given(log.mechanism, actuator, log.values(force)) else None
 
 
-def gives_commands(log: Log, joints: Sequence[str]) -> bool:
-    """Return whether the model's actuators give the force of each command, at once and unlimited.
+def gives_commands(log: Log, joints: Sequence[str], measured: Collection[str]) -> bool:
+    """Return whether the log says what force each actuator of the model gives.
+
+    It is measured, or the actuator gives that of its command, at once and unlimited.
 
     Parameters
     ----------
     log
         The log.
     joints
-        Joints with commands.
+        Joints that the log describes. Those without an actuator move freely.
+    measured
+        Joints whose force is in the log.
     """
     used = {actuator_on(log.mechanism, joint) for joint in joints}
     # A further actuator, such as a second motor, would push the joints as well.
     if set(log.mechanism.names("actuator")) - used:
         return False
-    return all(commanded_force(log, joint) is not None for joint in joints)
+    driven = {joint for joint in joints if actuator_on(log.mechanism, joint) is not None}
+    return all(commanded_force(log, joint) is not None for joint in driven - {*measured})
 
 
 def _is_given(mechanism: Mechanism, actuator: str, forces: Array) -> bool:
@@ -299,6 +304,6 @@ def _as_control(log: Log, signal: LogSignal) -> LogSignal:
         return signal
     return replace(
         signal,
-        scale=1.0 / constant,
+        scale=signal.scale / constant,
         assumed=(*signal.assumed, f"divided by the actuator's force of {constant:g} a unit"),
     )

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rigtwin.describing.checks import Slope, force_slopes, is_magnitude
+from rigtwin.describing.checks import Slope, force_slopes, is_magnitude, unforced_share
 from rigtwin.describing.log import STATED, Log
 from rigtwin.describing.match import MOTOR_CURRENT, REMAINING, UNNAMED, Match
 from rigtwin.describing.quantity import SI, JointQuantity
@@ -31,6 +31,8 @@ doubt. A link may weigh several times what the model says; a torque before a gea
 than the model's."""
 SHOWN = 0.5
 """Share of a force that the model must explain for its scale or sign to be judged."""
+UNFORCED = 0.5
+"""Largest share of the motion in which a magnitude of a force is zero."""
 MOTIONS = (JointQuantity.POSITION, JointQuantity.VELOCITY)
 """Quantities that are no force."""
 COMMANDS = (*MOVING, JointQuantity.VELOCITY_COMMAND, JointQuantity.VOLTAGE)
@@ -219,6 +221,9 @@ def _are_magnitudes(
     values = {joint: log.values(signal) for joint, signal in forces.items()}
     if not values or not all(is_magnitude(v, positions[j]) for j, v in values.items()):
         return False
+    # A hand or a hoist that pushes to one side lets go, and the joints move on.
+    if np.median([unforced_share(v, positions[j]) for j, v in values.items()]) > UNFORCED:
+        return False
     slopes = [slope_of(log, joint, positions, each) for joint, each in values.items()]
     # Inverse dynamics that explain a force show its sign, whatever its minimum is.
     return all(slope is None or slope.explained < SHOWN for slope in slopes)
@@ -296,7 +301,8 @@ def _check_force(log: Log, signal: LogSignal, slope: Slope) -> LogSignal:
     has_unit = signal.quantity is JointQuantity.FORCE and not signal.assumed
     is_possible = is_clear or (has_unit and SLOPE_LOW < abs(ratio) < SLOPE_HIGHEST)
     gear = _fitting_gear(log, signal.joint, abs(ratio))
-    is_doubtful = not stated and not is_possible
+    # A unit that is stated for all forces leaves their signs open, but not their scale.
+    is_doubtful = not stated and signal.quantity not in log.stated.units and not is_possible
     forces = (JointQuantity.FORCE, JointQuantity.FORCE_COMMAND)
     if is_doubtful and gear is not None and signal.quantity in forces:
         text = f"before the gear of the model's actuator: times {gear:g}"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -18,7 +17,6 @@ from rigtwin.describing.numbered_columns import (
 )
 from rigtwin.describing.quantity import ANGULAR, AXIAL, COORDINATES, MEASURED, JointQuantity
 from rigtwin.describing.question import enumerate_names
-from rigtwin.describing.replay_kind import takes_force
 from rigtwin.describing.stacked_states import split_state
 from rigtwin.description.joint_elements import actuator_on, movable_joints
 from rigtwin.description.mechanism import Mechanism
@@ -80,7 +78,6 @@ def match_columns(
     if (match := _remaining(columns, leading, matches, unused)) is not None:
         matches.append(match)
         del unused[match.column]
-    matches = [_as_taken(mechanism, match, columns) for match in matches]
     useless = {
         match.column: why for match in matches if (why := _useless(mechanism, match, columns))
     }
@@ -95,26 +92,6 @@ def _spell_out(names: Sequence[str], aliases: Sequence[Alias]) -> dict[str, tupl
         column: tuple(abbreviated.get(word, word) for word in heading)
         for column, heading in headings.items()
     }
-
-
-def _as_taken(mechanism: Mechanism, match: Match, columns: Columns) -> Match:
-    """Return a force that is no torque of its hinge as the command of the hinge's actuator.
-
-    A force at a handle or a thrust becomes the torque by the lever arm, which is the actuator's
-    gear.
-    """
-    unit = columns.units.get(match.column, "") or stated_unit(split_words(match.column))
-    is_straight = is_unit(unit) and unit_of(unit)[0] == "N"
-    if (
-        match.quantity is not JointQuantity.FORCE
-        or not is_straight
-        or not mechanism.turns(match.joint)
-        or actuator_on(mechanism, match.joint) is None
-        or not takes_force(mechanism, match.joint)
-    ):
-        return match
-    why = f"{match.why}; N is what the hinge's actuator takes"
-    return replace(match, quantity=JointQuantity.FORCE_COMMAND, why=why)
 
 
 def _useless(mechanism: Mechanism, match: Match, columns: Columns) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -24,6 +24,7 @@ from rigtwin.describing.force_signals import (
 )
 from rigtwin.describing.force_suggestions import suggest_forces
 from rigtwin.describing.formulas import read_formula
+from rigtwin.describing.hardly_moving import joints_at_rest
 from rigtwin.describing.log import Log
 from rigtwin.describing.match import Match
 from rigtwin.describing.matching import match_columns
@@ -72,6 +73,8 @@ class Reading:
         Joints whose actuator does nothing throughout.
     velocities
         Joints whose velocity was measured in place of their position.
+    resting
+        Joints that hardly move, whose forces are not judged.
     schedules
         Columns that friction or a force may follow.
     band
@@ -86,6 +89,7 @@ class Reading:
     notes: tuple[str, ...] = ()
     idle: tuple[str, ...] = ()
     velocities: tuple[str, ...] = ()
+    resting: tuple[str, ...] = ()
     schedules: tuple[ScheduleColumn, ...] = ()
     band: float | None = None
 
@@ -116,7 +120,7 @@ def read_log(
     log, matches = _open(mechanism, columns, stated)
     motions = _without_followers(log, _motions(log))
     values = {joint: _position(log, signal) for joint, signal in motions.items()}
-    kind, movers = _choose_movers(log, test, list(motions.values()), values)
+    kind, resting, movers = _choose_movers(log, test, list(motions.values()), values)
     joints = list(motions)
     signals = [*motions.values(), *movers]
     # Only forces can be held against inverse dynamics.
@@ -130,7 +134,8 @@ def read_log(
         measured = "velocities" if velocities else "positions"
         log.notes.append(f"{measured} have the signs of the log")
     idle = [signal.joint for signal in movers if not np.any(log.values(signal))]
-    band = _band(log, kind.test, values)
+    moving = {joint: place for joint, place in values.items() if joint not in resting}
+    band = _band(log, kind.test, moving)
     unused = _unused(log, signals, matches)
     schedules = schedule_columns(log, joints, {*log.columns.values} - {*unused})
     return Reading(
@@ -142,6 +147,7 @@ def read_log(
         notes=tuple(log.notes),
         idle=tuple(idle) if kind.test == FORCES else (),
         velocities=tuple(velocities),
+        resting=resting,
         schedules=schedules,
         band=band,
     )
@@ -192,12 +198,15 @@ def _position(log: Log, signal: LogSignal) -> Array:
 
 def _choose_movers(
     log: Log, test: str, signals: Sequence[LogSignal], positions: Mapping[str, Array]
-) -> tuple[ReplayKind, list[LogSignal]]:
-    """The kind of the test, and the forces or commands that it needs."""
+) -> tuple[ReplayKind, tuple[str, ...], list[LogSignal]]:
+    """The kind of the test, joints that hardly move, and the forces or commands that are needed."""
     joints = list(positions)
     withdraw_references(log, positions)
     offer_remaining_command(log, positions)
     forces, still = force_signals(log, positions)
+    resting = joints_at_rest(log, positions)
+    # Stiction may hold any force of a joint that rests, so none has to be known.
+    known = joints if forces and {*forces, *resting} == {*joints} else list(forces)
     by_servos = len(forces) == len(joints) and come_from_servos(log, positions, forces)
     try:
         placed = all(signal.quantity is JointQuantity.POSITION for signal in signals)
@@ -205,12 +214,12 @@ def _choose_movers(
             log.mechanism,
             log.slots,
             joints,
-            list(forces),
+            known,
             list(still),
             placed,
             test,
             by_servos,
-            by_commands=gives_commands(log, joints),
+            by_commands=gives_commands(log, joints, forces),
         )
     except Question as question:
         before = len(log.questions)
@@ -223,10 +232,16 @@ def _choose_movers(
                 log.questions.append(str(question))
             raise _all_questions(log, signals) from None
         kind = swing
-    movers = _movers(log, kind.test, positions, forces, still)
+    resting = resting if kind.test == INVERSE else ()
+    log.notes += [
+        f"{joint}: it hardly moves, so that stiction may hold any force, which is not judged"
+        for joint in resting
+    ]
+    moving = {joint: place for joint, place in positions.items() if joint not in resting}
+    movers = _movers(log, kind.test, moving, forces, still)
     if log.questions:
         raise _all_questions(log, signals)
-    return kind, list(movers.values())
+    return kind, resting, list(movers.values())
 
 
 def _open(
@@ -266,10 +281,14 @@ def _movers(
     """Forces or commands that the test needs, by joint."""
     movers: dict[str, LogSignal] = {}
     free = swinging(log.mechanism, list(positions)) if test == FORCES else []
+    driven = {joint for joint in positions if actuator_on(log.mechanism, joint) is not None}
+    passive = set(positions) - driven if driven else set()
     for joint, position in positions.items():
         mover: LogSignal | None = None
         if test == INVERSE:
             mover = forces.get(joint) or commanded_force(log, joint)
+            if mover is None and joint in passive:
+                mover = replace(no_force(joint), quantity=JointQuantity.FORCE)
             if mover is None:
                 log.questions.append(
                     f"no measured force of joint {joint}; say {option(f'{joint}.force', 'COLUMN')}"

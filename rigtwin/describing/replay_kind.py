@@ -11,7 +11,7 @@ from rigtwin.describing.question import ask, enumerate_names, option
 from rigtwin.describing.slots import Slots
 from rigtwin.description.coupling import are_coupled
 from rigtwin.description.implied import FORCES, INVERSE, POSITIONS, SERVOS, TESTS
-from rigtwin.description.joint_elements import actuator_on
+from rigtwin.description.joint_elements import actuator_on, movable_joints
 from rigtwin.description.mechanism import Mechanism
 from rigtwin.description.mistakes import suggest
 from rigtwin.errors import RigtwinError
@@ -119,12 +119,24 @@ def _kind_by_commands(
         if any(mechanism.falls_with_speed(actuator_on(mechanism, j) or "") for j in pushed):
             return ReplayKind(FORCES, "the actuators' commands are in the log")
         # Small errors of the forces make the predicted motion of an arm run away.
-        together = len(pushed) == len(joints) > 1 and are_coupled(mechanism, joints)
-        if together and are_forces:
+        together = len(joints) > 1 and are_coupled(mechanism, joints)
+        if together and are_forces and _forces_are_known(mechanism, joints):
             why = "the actuators take forces, and those of every joint are in the log"
             return ReplayKind(INVERSE, why)
         return ReplayKind(FORCES, "the actuators take forces, and those are in the log")
     return None
+
+
+def _forces_are_known(mechanism: Mechanism, joints: Sequence[str]) -> bool:
+    """Return whether the forces of actuators at joints are those at all joints of a model.
+
+    No other joint moves, but for those that follow them, and no actuator pulls at several joints.
+    The force at a joint without an actuator is zero.
+    """
+    followers = {tie.joint for tie in mechanism.ties_of(joints)[0]}
+    actuators = [name for joint in joints if (name := actuator_on(mechanism, joint)) is not None]
+    single = all(len(mechanism.acts_on("actuator", name)) == 1 for name in actuators)
+    return single and set(movable_joints(mechanism)) - followers <= set(joints)
 
 
 def _read_stated(stated: str) -> str:

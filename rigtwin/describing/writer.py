@@ -72,6 +72,8 @@ def write_description(
         lines.append(f"joints = [{', '.join(map(_quote, reading.joints))}]")
     if reading.velocities:
         lines.append(f"velocities = [{', '.join(map(_quote, reading.velocities))}]")
+    if reading.resting:
+        lines.append(f"resting = [{', '.join(map(_quote, reading.resting))}]")
     if reading.band is not None:
         lines.append(
             f"band = {reading.band!r}            # Hz; above it forces are ripple or noise"

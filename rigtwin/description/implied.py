@@ -44,7 +44,7 @@ TESTS = {
 """Kind of test → its inputs and its predicted signals."""
 MOVERS = {POSITIONS: "position actuator", SERVOS: "servo", FORCES: "force actuator"}
 """Kind of test → type of the components that take its commands."""
-KEYS = ("test", "joints", "velocities")
+KEYS = ("test", "joints", "velocities", "resting")
 """Keys of a replay whose components are implied."""
 PRESCRIBED = [
     "coulomb",
@@ -146,16 +146,23 @@ def _expand_replay(
     if not isinstance(velocities, list) or not set(map(str, velocities)) <= set(joints):
         mistakes.note(where, f"velocities = {str(velocities)[:40]}: expected a list of joints")
         return
+    resting = table.get("resting", [])
+    if not isinstance(resting, list) or not set(map(str, resting)) < set(joints):
+        mistakes.note(where, f"resting = {str(resting)[:40]}: expected a list of some joints")
+        return
+    if resting and test != INVERSE:
+        mistakes.note(where, f"resting: with test = {test!r} no forces are predicted")
+        return
     keys = {key: value for key, value in table.items() if key not in KEYS}
     # Joints under position commands follow them whatever the load: coupling has no influence.
     together = test != POSITIONS and are_coupled(mechanism, joints)
-    groups = [list(joints)] if together else [[joint] for joint in joints]
+    groups = [list(joints)] if together else [[j] for j in joints if j not in resting]
     for group in groups:
         # One table becomes several replays, which need names of their own.
         group_keys = keys if len(groups) == 1 else {**keys, "name": identifier(group[0])}
         group_keys.setdefault("name", "all joints" if together else identifier(group[0]))
         free = swinging(mechanism, joints)
-        _add_group(test, group, group_keys, mechanism, implied, free, velocities)
+        _add_group(test, group, group_keys, mechanism, implied, free, velocities, resting)
     if together:
         # The base comes last: a joint may have its name.
         add_base(mechanism, implied.components)
@@ -169,11 +176,12 @@ def _add_group(
     implied: Implied,
     free: Sequence[str],
     velocities: Sequence[str],
+    resting: Sequence[str],
 ) -> None:
     """Add the components of joints that are replayed together, and their replay.
 
-    `free` are the joints that swing freely, and `velocities` those whose velocity is measured in
-    place of their position.
+    `free` are the joints that swing freely, `velocities` those whose velocity is measured in place
+    of their position, and `resting` those whose force is not judged.
     """
     tables = implied.components
     sensors: list[str] = []
@@ -189,10 +197,10 @@ def _add_group(
             # Position commands move the joint whatever the load, so its friction cannot be seen.
             tables[identifier(joint)] = {"joint": joint}
     if test == INVERSE:
-        forces = _add_forces(joints, mechanism, tables)
+        forces = _add_forces(joints, resting, mechanism, tables)
         for joint, name in zip(joints, sensors, strict=True) if len(joints) > 1 else ():
             # A wrong zero shows in the gravity loads, as a constant force of one joint does not.
-            if any(mechanism.joint(joint).gravity):
+            if joint not in resting and any(mechanism.joint(joint).gravity):
                 tables[name]["effects"] = ["offset"]
         implied.replays.append({**keys, "moved_by": sensors, "observe": forces})
         return
@@ -235,18 +243,27 @@ def _sensor_effects(mechanism: Mechanism, joint: str, test: str, has_velocity: b
 
 
 def _add_forces(
-    joints: Sequence[str], mechanism: Mechanism, tables: dict[str, dict[str, Any]]
+    joints: Sequence[str],
+    resting: Sequence[str],
+    mechanism: Mechanism,
+    tables: dict[str, dict[str, Any]],
 ) -> list[str]:
-    """Add the components of joints that move as measured; return the names of the force sensors."""
-    forces = [sensor_name(mechanism, joint, "force") for joint in joints]
-    for joint, name in zip(joints, forces, strict=True):
+    """Add the components of joints that move as measured; return the names of the force sensors.
+
+    Joints that rest have none.
+    """
+    moving = [joint for joint in joints if joint not in resting]
+    forces = [sensor_name(mechanism, joint, "force") for joint in moving]
+    for joint, name in zip(moving, forces, strict=True):
         tables[name] = sensor_table(mechanism, joint, "force")
         # No machine is warm from the first moment on.
         tables[f"{identifier(joint)}_warming"] = {"joint": joint, "type": "warming"}
     if len(joints) == 1:
         add_mass(mechanism, joints[0], tables)
         return forces
-    for joint, name in zip(joints, forces, strict=True):
+    for joint in resting:
+        tables[identifier(joint)]["effects"] = []
+    for joint, name in zip(moving, forces, strict=True):
         # Several joints: a short list keeps the number of explanations small enough to tell apart.
         tables[identifier(joint)]["effects"] = PRESCRIBED
         tables[name]["effects"] = PRESCRIBED_FORCE

@@ -144,7 +144,7 @@ def check_scale(machine: Machine, recording: RecordedTest, predicted: Array) -> 
         # has its preload, which says its scale even at rest.
         whole = row.kind == "force" and np.isfinite(far)
         a, b = (signal, model) if whole else (signal - signal.mean(), model - model.mean())
-        if rms(b) == 0.0 or rms(a) < MOVES * white_noise(signal) or not np.isfinite(b).all():
+        if rms(b) == 0.0 or rms(a) <= MOVES * white_noise(signal) or not np.isfinite(b).all():
             continue
         correlation, slope = (
             float(a @ b) / float(np.sqrt((a @ a) * (b @ b))),
