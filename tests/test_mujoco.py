@@ -49,6 +49,7 @@ SIZES = {
     "armature": 0.8,
     "gain": 1.3,
     "gain_asymmetry": 0.5,
+    "curvature": 0.5,
     "lag": 0.03,
     "delay": 0.02,
     "saturation": 14.0,
@@ -58,6 +59,7 @@ SIZES = {
 }
 """Each effect's magnitude; large, so that a law that is not there is seen."""
 SHAPES = {
+    "curvature": {"full_command": 20.0},
     "end_stops": {"stop_damping": 5.0, "stop_low": -0.03, "stop_high": 0.06},
     "slack": {"stiffness": 240.0},
     "cubic_stiffness": {"stiffness": 240.0},

@@ -15,10 +15,12 @@ class ForceActuator(NamedTuple):
     """Actuator whose command becomes a force.
 
     Order of operations: limits of the command, delay, deadband, gain, saturation, rate limit, lag,
-    `constant`, limit of the force. With the upper sign for positive commands:
+    `constant`, limit of the force. With the upper sign for positive commands u:
 
-        effective gain     = gain·(1 ± ½·gain_asymmetry)
+        effective gain     = gain·(1 ± ½·gain_asymmetry)·(1 − c + c·|u|/full_command)
         effective deadband = deadband ± ½·deadband_asymmetry
+
+    with the curvature c. The thrust of a propeller grows with the square of its command: c = 1.
     """
 
     # Static law and limits, read from the MJCF: force = constant · conditioned command.
@@ -33,6 +35,10 @@ class ForceActuator(NamedTuple):
     # Conditioning of the command; neutral in the nominal machine.
     gain: Annotated[float, Quantity("1", 0.05, 5.0, "1: as specified")] = 1.0
     gain_asymmetry: Annotated[float, Quantity("1", -2.0, 2.0, NONE)] = 0.0
+    curvature: Annotated[float, Quantity("1", -1.0, 1.5, NONE)] = 0.0
+    full_command: Annotated[
+        float, Quantity("unit of the command", 1e-9, UNLIMITED, "1: of a normalised command")
+    ] = 1.0
     lag: Annotated[float, Quantity("s", 0.0, 10.0, NONE)] = 0.0
     delay: Annotated[float, Quantity("s", 0.0, 1.0, NONE)] = 0.0
     deadband: Annotated[float, Quantity("unit of the command", 0.0, UNLIMITED, NONE)] = 0.0

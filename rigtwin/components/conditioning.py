@@ -5,7 +5,7 @@ With the command u[k] at step k, the order of operations is
     limits      u ← clip(u, low, high)
     delay       u ← u[k − delay]
     deadband    u ← sign(u)·max(|u| − band, 0)  (amplifier), or a backlash of ±band (valve)
-    gain        u ← gain·(1 ± uneven)·u, by the direction of u
+    gain        u ← gain·(1 ± uneven)·(1 − curvature + curvature·|u|/full)·u, by the direction of u
     saturation  u ← clip(u, −saturation, saturation)
     rate limit  y ← y + clip(u − y, −rate, rate)
     lag         z ← z + (1 − exp(−h/T))·(y − z)
@@ -47,6 +47,8 @@ class Actuator(NamedTuple):
     reach: float  # Widening of the deadband to positive commands, and narrowing to negative ones.
     gain: float  # Mean gain of both directions.
     uneven: float  # Share of the gain added for positive commands and taken from negative ones.
+    straight: float  # Share of the gain that is the same for all commands.
+    curved: float  # Share of the gain that a command of 1 adds.
     saturation: float  # Largest magnitude after the gain.
     rate: float  # Largest change in a timestep.
     share: float  # Share of the remaining distance that the lag covers in a timestep.
@@ -83,21 +85,16 @@ def actuator(component: Motor | Cylinder | Pusher, computer: Computer, timestep:
     # its position error, in `servo`.
     delay = component.delay + computer.delay
     rate = UNLIMITED if isinstance(component, Cylinder) else component.rate_limit
-    uneven = 0.5 * component.gain_asymmetry if isinstance(component, ForceActuator) else 0.0
-    reach = 0.5 * component.deadband_asymmetry if isinstance(component, ForceActuator) else 0.0
+    uneven = reach = curvature = 0.0
+    full = 1.0
+    if isinstance(component, ForceActuator):
+        uneven, reach = 0.5 * component.gain_asymmetry, 0.5 * component.deadband_asymmetry
+        curvature, full = component.curvature, component.full_command
     deadband, saturation = 0.0, UNLIMITED
     if not isinstance(component, Servo):
         deadband, saturation = component.deadband, component.saturation
-    neutral = (delay, deadband, reach, component.gain, uneven, saturation, rate, component.lag) == (
-        0.0,
-        0.0,
-        0.0,
-        1.0,
-        0.0,
-        UNLIMITED,
-        UNLIMITED,
-        0.0,
-    )
+    absent = (delay, deadband, reach, uneven, curvature, component.lag) == (0.0,) * 6
+    neutral = absent and (component.gain, saturation, rate) == (1.0, UNLIMITED, UNLIMITED)
     share = mean_share = 1.0
     if component.lag > 0.0:
         steps = timestep / component.lag
@@ -113,6 +110,8 @@ def actuator(component: Motor | Cylinder | Pusher, computer: Computer, timestep:
         reach=reach,
         gain=component.gain,
         uneven=uneven,
+        straight=1.0 - curvature,
+        curved=curvature / full,
         saturation=saturation,
         rate=rate * timestep if rate < UNLIMITED else UNLIMITED,
         share=share,
@@ -144,6 +143,7 @@ def limit(conditioning: Actuator, state: ActuatorState, command: float) -> float
         state.memory[1] = passed
     uneven = conditioning.uneven
     scaled = conditioning.gain * passed * (1.0 + (uneven if passed > 0.0 else -uneven))
+    scaled *= conditioning.straight + conditioning.curved * abs(passed)
     return min(max(scaled, -conditioning.saturation), conditioning.saturation)
 
 

@@ -53,6 +53,18 @@ def _uneven_deadband(context: Context) -> Starts:
     return Starts(tuple(starts), (0.001 * size, 0.001 * size))
 
 
+def _curvature(context: Context) -> Starts:
+    """Return starts of a curved characteristic that agrees with the straight one at a command."""
+    full = max(context.swing.largest[0], 1e-12)
+    starts = [
+        (share, 1.0 / (1.0 - share + share * command / full), full)
+        for share in (0.5, 1.0)
+        for command in sorted({max(size, 0.1 * full) for size in context.swing.largest})
+    ]
+    # The largest command is where the start has it: its step is 0.
+    return Starts(tuple(starts), (0.01, 0.004, 0.0))
+
+
 def _yielding(context: Context) -> Starts:
     # A plate's zero was set without load, or under about the load that it bears in the test.
     starts = tuple(product((2e-7, 1e-6, 5e-6), (0.0, 0.005), (0.0, context.scales.force)))
@@ -110,6 +122,14 @@ KINDS = (
         "output greater for positive commands than for negative, by this share",
         _for_types(fixed_starts((-0.3, -0.07, 0.07, 0.3), 0.004), ForceActuator),
         "output smaller for positive commands than for negative, by this share",
+    ),
+    Kind(
+        "curvature",
+        "quadratic share",
+        ("curvature", "gain", "full_command"),
+        "a force of which this share grows with the square of the command, up to the largest one",
+        {ForceActuator: _curvature},
+        constants=("full_command",),
     ),
     Kind(
         "lag",

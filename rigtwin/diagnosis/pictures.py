@@ -62,6 +62,7 @@ PICTURES: dict[str, str] = {
     "delay": "phase",
     "gain": "line",
     "gain_asymmetry": "line",
+    "curvature": "line",
     "offset": "line",
     "drift": "record",
     "eccentricity": "position",

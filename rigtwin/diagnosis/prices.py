@@ -43,12 +43,12 @@ ELUSIVE = ("payload",)
 """Kinds of a rigid body that are rare. A payload has a place besides its mass, so that it resembles
 the zero or the friction of several joints."""
 RARE_AT: dict[type, tuple[str, ...]] = {
-    ForceActuator: ("backlash",),
+    ForceActuator: ("backlash", "curvature"),
     Warming: ("coulomb", "viscous"),
 }
 """Type of component without dry friction → kinds that are rare at it. Of a pushed joint, play takes
 four times the steps of any other effect."""
-CONTAINS_SIMPLER = ("two_lags", "mount", "deadband_asymmetry")
+CONTAINS_SIMPLER = ("two_lags", "mount", "deadband_asymmetry", "curvature")
 """Kinds that become a simpler kind at an end of their range."""
 LATE = ("delay", "lag")
 """Kinds that make a signal late, or early where negative."""

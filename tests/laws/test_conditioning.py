@@ -80,6 +80,14 @@ def test_a_gain_differs_by_half_its_asymmetry_each_way():
         assert passed(uneven, size * SWING) == pytest.approx(expected, abs=1e-12)
 
 
+@law_of("curvature", ForceActuator)
+@pytest.mark.parametrize("share", [0.4, 1.0, -0.3])
+def test_a_share_of_a_force_grows_with_the_square_of_its_command(share):
+    curved = ForceActuator(gain=1.2, curvature=share, full_command=2.5)
+    expected = 1.2 * ((1.0 - share) * SWING + share * SWING * np.abs(SWING) / 2.5)
+    assert passed(curved, SWING) == pytest.approx(expected, abs=1e-12)
+
+
 @law_of("lag", Motor, Cylinder, ForceActuator, Servo, VelocityServo)
 @pytest.mark.parametrize("component", ACTUATORS)
 @pytest.mark.parametrize("lag", [0.004, 0.03])

@@ -60,6 +60,7 @@ NOMINAL: dict[type, dict[str, float]] = {
         "saturation": NO_LIMIT,
         "rate_limit": NO_LIMIT,
         "rotor_share": 0.5,
+        "full_command": 1.0,
         **RANGE,
     },
     ForceSensor: {"gain": 1.0},
