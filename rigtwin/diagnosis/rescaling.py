@@ -1,8 +1,9 @@
 """Starts that scale all forces and inertias of a hypothesis together.
 
-Where no force is measured, the equation of motion of a servo's joint
+Where no force is measured, the equation of motion of a joint that a servo or a force moves,
 
     m·a + viscous·v + coulomb·sign(v) + … = position_gain·(command − position) − damping_gain·v
+    m·a + viscous·v + coulomb·sign(v) + … = gain·command,
 
 holds with all its coefficients scaled by a common factor as well. A search may therefore correct
 gain, mass and friction where a different damping alone is the cause: the same motion, at another
@@ -13,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from rigtwin.components import Effect
+from rigtwin.components import Effect, ForceActuator, measures
 from rigtwin.components.plant import Plant
 from rigtwin.diagnosis.fit import Fit, clashes, is_possible
 from rigtwin.diagnosis.starts import Start
@@ -25,6 +26,8 @@ SCALED = (
     "asymmetry",
     "stiffness",
     "mass",
+    "armature",
+    "gain",
     "position_gain",
     "damping_gain",
 )
@@ -32,7 +35,7 @@ SCALED = (
 BOTH = "gains"
 """Kind that multiplies the position and the damping gain of its servo."""
 GAINS = ("position_gain", "damping_gain")
-BASIC = ("mass", *GAINS)
+BASIC = ("mass", "armature", "gain", *GAINS)
 """Kinds whose nominal value is scaled too where the hypothesis leaves it nominal. Nominal friction
 is small enough to be left as it is."""
 NEAR = 0.05
@@ -63,7 +66,7 @@ def start_rescaled(plant: Plant, leader: Fit, candidates: Sequence[Effect]) -> l
     nominal = {
         effect: _magnitude(effect, plant)
         for effect in candidates
-        if effect.kind.name in SCALED and len(effect.kind.parameters) == 1
+        if effect.kind.name in SCALED and len(effect.kind.parameters) == 1 and _is_scaled(effect)
     }
     fitted = _coefficients_of(leader, nominal)
     others = [
@@ -86,6 +89,11 @@ def start_rescaled(plant: Plant, leader: Fit, candidates: Sequence[Effect]) -> l
         if 0 < len(pairs) <= len(leader.effects) + LONGER and _is_consistent(effects, plant):
             starts.append((effects, tuple(values for _, values in pairs)))
     return starts
+
+
+def _is_scaled(effect: Effect) -> bool:
+    """Return whether an effect's magnitude is a coefficient, and not a factor on a reading."""
+    return effect.of is ForceActuator if effect.kind.name == "gain" else not measures(effect.of())
 
 
 def _equal(value: float, other: float) -> bool:

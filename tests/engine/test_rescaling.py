@@ -81,3 +81,36 @@ def test_a_factor_on_both_gains_is_multiplied_out(plant: Plant):
 
 def test_what_has_no_scale_is_left_alone(plant: Plant):
     assert starts_from(plant, delay_a=0.01) == []
+
+
+PUSHED = """
+<mujoco>
+  <worldbody>
+    <body name="cart">
+      <joint name="slider" type="slide" axis="1 0 0" damping="4" armature="0.5"/>
+      <geom size="0.1" mass="2"/>
+    </body>
+  </worldbody>
+  <actuator><motor name="drive" joint="slider"/></actuator>
+</mujoco>
+"""
+
+
+def test_a_heavy_cart_with_much_friction_has_a_weak_drive(tmp_path: Path):
+    """Mass, rotor and damping are those of the MJCF at the scale of a gain of 0.8."""
+    (tmp_path / "cart.xml").write_text(PUSHED)
+    (tmp_path / "cart.toml").write_text(
+        '[machine]\nname = "cart"\nmodel = "cart.xml"\n\n[[replays]]\ntest = "force commands"\n'
+    )
+    plant = load(tmp_path / "cart.toml").plant
+    names = ("mass@cart", "armature@slider_rotor", "viscous@slider", "stiffness@slider")
+    effects = [find(name, plant) for name in (*names, "gain@drive", "gain@slider_position")]
+    values = ((2.5,), (0.625,), (5.0,), (30.0,))
+    leader: Any = SimpleNamespace(effects=tuple(effects[:4]), values=values)
+    starts = [
+        {str(effect.name): value for effect, (value,) in zip(*start, strict=True)}
+        for start in start_rescaled(plant, leader, effects)
+    ]
+    expected = {"gain@drive": 0.8, "stiffness@slider": 24.0}
+    assert any(start == pytest.approx(expected) for start in starts)
+    assert not any("gain@slider_position" in start for start in starts)
