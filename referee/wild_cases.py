@@ -36,7 +36,7 @@ ACCEPTED: Mapping[str, tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]]
     "wearing": (("viscous",), (), ()),
     "coloured": ((), (), ("noise",)),
     "steps": ((), (), ("quantisation",)),
-    "eccentric": ((), (), ("gain",)),
+    "eccentric": ((), (), ("gain", "eccentricity")),
     "ripple": (("cogging",), ("cogging",), ()),
     "hardening": (("stiffness", "cubic_stiffness", "position_force"), (), ()),
     "sag": ((), ("gain", "saturation"), ()),

@@ -22,7 +22,7 @@ the files alone; then the key is opened, checked against its digest, and every a
 
 With --wild the machines are others than the rig, and their physics have forms that the library
 does not have: friction with a memory or a smooth change of sign, a second mass on a hidden spring,
-a frame that yields, drift, eccentric encoders. What a person would accept as an answer is in the
+a frame that yields, drift, drives that sag. What a person would accept as an answer is in the
 referee's table.
 
 With --machine arm the machines are planar arms of two and three hinges, and a cart with a
