@@ -20,8 +20,6 @@ CORNER = 8.0
 """Hz; motions are smoothed before they are differentiated."""
 EDGE = 0.05
 """Share of the rows at either end that does not count."""
-EXPLAINED = 0.25
-"""Share of a force's variance that its inertia and gravity must explain to show its sign."""
 MOVING = 0.2
 """Share of the highest speed from which a joint moves."""
 MAGNITUDE_REVERSALS = 4

@@ -5,9 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from rigtwin.components import Effect, Guide
 from rigtwin.components.guide_effects import THROUGH_FRICTION
 from rigtwin.components.plant import P, Plant, parameter_of, with_parameters
+from rigtwin.numerics.arrays import Array
 
 Values = tuple[tuple[float, ...], ...]
 """Values of several effects: one tuple per effect, in the order of its kind's parameters."""
@@ -48,6 +51,12 @@ class Fit:
     def name(self) -> str:
         """Names of the effects, joined by a plus sign."""
         return " + ".join(effect.name for effect in self.effects) or "none"
+
+
+def split_values(effects: Sequence[Effect], vector: Array) -> Values:
+    """Cut a vector of all parameters, shape (parameters,), into the values of each effect."""
+    cuts = np.cumsum([len(effect.kind.parameters) for effect in effects])[:-1]
+    return tuple(tuple(part.tolist()) for part in np.split(vector, cuts)) if effects else ()
 
 
 def with_values(plant: P, effects: Sequence[Effect], values: Sequence[Sequence[float]]) -> P:

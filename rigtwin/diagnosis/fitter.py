@@ -19,7 +19,7 @@ from rigtwin.components.guide import resists
 from rigtwin.components.plant import Plant, component_of
 from rigtwin.diagnosis.effect_starts import EffectStarts
 from rigtwin.diagnosis.evidence import Evidence
-from rigtwin.diagnosis.fit import Fit, Values, is_possible, with_values
+from rigtwin.diagnosis.fit import Fit, Values, is_possible, split_values, with_values
 from rigtwin.diagnosis.gauss_newton import minimise
 from rigtwin.diagnosis.space import Space
 from rigtwin.diagnosis.waves import blend_waves
@@ -348,15 +348,10 @@ class Fitter:
         space, base = space or self.space, base or self.plant
         if not effects:
             return Fit((), (), space.misfit(self.evidence.residual(base)), (), self.plant)
-        sizes = [len(effect.kind.parameters) for effect in effects]
         steps = np.concatenate([self.starts(effect).steps for effect in effects])
 
-        def split(vector: Array) -> Values:
-            cuts = np.cumsum(sizes)[:-1]
-            return tuple(tuple(part.tolist()) for part in np.split(vector, cuts))
-
         def residual(vector: Array) -> Array:
-            return self.evidence.residual(with_values(base, effects, split(vector)))
+            return self.evidence.residual(with_values(base, effects, split_values(effects, vector)))
 
         # The plant of the result is the nominal one with the effects, even where `base` has its
         # tolerances moved: a finding is about effects alone.
@@ -368,11 +363,11 @@ class Fitter:
             self.bounds(effects),
             self.evidence.expected,
         )
-        values = split(minimum.values)
+        values = split_values(effects, minimum.values)
         return Fit(
             effects,
             values,
             minimum.misfit,
-            split(minimum.widths),
+            split_values(effects, minimum.widths),
             with_values(self.plant, effects, values),
         )

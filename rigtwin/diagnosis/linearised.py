@@ -13,7 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from rigtwin.components import Effect
-from rigtwin.diagnosis.fit import Fit, Values, is_possible, with_values
+from rigtwin.diagnosis.fit import Fit, Values, is_possible, split_values, with_values
 from rigtwin.diagnosis.fitter import Fitter
 from rigtwin.diagnosis.gauss_newton import DAMPING, take_derivatives
 from rigtwin.numerics.arrays import Array
@@ -40,15 +40,15 @@ class Linearised:
 
     def __init__(self, fitter: Fitter, fit: Fit) -> None:
         self._fitter, self.fit = fitter, fit
-        self._sizes = [len(effect.kind.parameters) for effect in fit.effects]
+        sizes = [len(effect.kind.parameters) for effect in fit.effects]
         # Number of the effect that each parameter of the flat vector belongs to.
-        self._owner = np.repeat(np.arange(len(self._sizes)), self._sizes)
+        self._owner = np.repeat(np.arange(len(sizes)), sizes)
         self._steps = np.concatenate([fitter.starts(effect).steps for effect in fit.effects])
         self._values = np.concatenate([np.asarray(values, float) for values in fit.values])
         self._bounds = fitter.bounds(fit.effects)
 
         def residual(vector: Array) -> Array:
-            plant = with_values(fitter.plant, fit.effects, self._split(vector))
+            plant = with_values(fitter.plant, fit.effects, split_values(fit.effects, vector))
             return fitter.evidence.residual(plant)
 
         self._residual = residual(self._values)
@@ -59,10 +59,6 @@ class Linearised:
         # The same damping as in the fit keeps the matrix regular where a parameter has no response.
         self._normal = normal + np.diag(DAMPING * np.diag(normal) + 1e-12)
 
-    def _split(self, vector: Array) -> Values:
-        cuts = np.cumsum(self._sizes)[:-1]
-        return tuple(tuple(part.tolist()) for part in np.split(vector, cuts))
-
     def columns_of(self, subset: Sequence[int]) -> Array:
         """Return the responses to a step of each parameter of some effects, shape (size, n)."""
         return self._jacobian[:, np.isin(self._owner, subset)]
@@ -71,13 +67,15 @@ class Linearised:
         """Return the values of some effects, moved by a number of steps each, within bounds."""
         moves = np.zeros(len(self._values))
         moves[np.isin(self._owner, subset)] = steps
-        values = self._split(np.clip(self._values + moves * self._steps, *self._bounds))
+        values = split_values(
+            self.fit.effects, np.clip(self._values + moves * self._steps, *self._bounds)
+        )
         return tuple(values[number] for number in subset)
 
     @property
     def misfit(self) -> float:
         """Misfit with all effects, once they are refitted to the fitter's own evidence."""
-        return self._keep_only(range(len(self._sizes)))[0]
+        return self._keep_only(range(len(self.fit.effects)))[0]
 
     def leave_out_each(self) -> list[Reduced]:
         """Leave out each effect in turn, and refit the others.
@@ -88,7 +86,9 @@ class Linearised:
             Misfit, remaining effects and their values, the least misfit first. Sets in which an
             effect lacks the dry friction that it acts through are omitted.
         """
-        reduced = [self._as_they_are(each) for each in self._leave_out(range(len(self._sizes)))]
+        reduced = [
+            self._as_they_are(each) for each in self._leave_out(range(len(self.fit.effects)))
+        ]
         return sorted(reduced, key=lambda result: result[0])
 
     def _as_they_are(self, reduced: Reduced) -> Reduced:
@@ -147,5 +147,7 @@ class Linearised:
         # The linear prediction suffices to rank subsets, and costs no simulation. The best of them
         # are fitted from these values, which therefore have to be within their bounds.
         misfit = self._fitter.space.misfit(self._residual + self._jacobian @ move)
-        values = self._split(np.clip(self._values + move * self._steps, *self._bounds))
+        values = split_values(
+            self.fit.effects, np.clip(self._values + move * self._steps, *self._bounds)
+        )
         return misfit, tuple(values[number] for number in subset)

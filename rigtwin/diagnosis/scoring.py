@@ -16,7 +16,7 @@ follows from the products J'J, J'r and r'r of every block, so that judging a fit
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -28,7 +28,7 @@ from rigtwin.diagnosis.blocks import (
     count_samples,
     excess_by_band,
 )
-from rigtwin.diagnosis.fit import Fit, Values, with_values
+from rigtwin.diagnosis.fit import Fit, Values, split_values, with_values
 from rigtwin.diagnosis.fitter import Fitter
 from rigtwin.diagnosis.gauss_newton import shorten, take_derivatives
 from rigtwin.diagnosis.left_out_blocks import cross_validate, normal_matrix, standard_errors
@@ -133,16 +133,15 @@ class Scorer:
     def _score(self, fit: Fit) -> Scored:
         evidence, fitter = self._evidence, self._fitter
         base = fitter.plant if fit.base is None else fit.base
-        sizes = [len(effect.kind.parameters) for effect in fit.effects]
-        count = sum(sizes)
 
         def residual_at(vector: Array) -> Array:
-            return evidence.residual(with_values(base, fit.effects, _split(vector, sizes)))
+            return evidence.residual(
+                with_values(base, fit.effects, split_values(fit.effects, vector))
+            )
 
         space = fitter.space.without_replaced(fit.effects)
-        values = (
-            np.concatenate([np.asarray(v, float) for v in fit.values]) if count else np.zeros(0)
-        )
+        values = np.array([value for values in fit.values for value in values], float)
+        count = len(values)
         residual = residual_at(values)
         used = np.array(fit.used) if fit.used else np.zeros(space.columns.shape[1])
         columns, steps = self._derive(fit, residual_at, values, residual)
@@ -178,7 +177,9 @@ class Scorer:
         moves = self._moves(fit, values, steps)
         return replace(
             scored,
-            widths=_split(standard_errors(products, expected, prior, count) * steps, sizes),
+            widths=split_values(
+                fit.effects, standard_errors(products, expected, prior, count) * steps
+            ),
             reach=_reach(moves, products),
             together=_together(moves, products),
             accounts=self._accounts(moves, products, prior),
@@ -268,9 +269,3 @@ def _reach(moves: Array, products: Array) -> Array:
 def _pad(values: Array, count: int) -> Array:
     """Put zeros before values: the effects' parameters have no prior."""
     return np.concatenate([np.zeros(count), values])
-
-
-def _split(vector: Array, sizes: Sequence[int]) -> Values:
-    """Cut a vector of all parameters into the values of each effect."""
-    cuts = np.cumsum(sizes)[:-1]
-    return tuple(tuple(part.tolist()) for part in np.split(vector, cuts)) if len(sizes) else ()

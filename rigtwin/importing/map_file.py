@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from controllers.formula import Formula, formula
+from rigtwin.description.changes import read_toml
 from rigtwin.errors import RigtwinError
 from rigtwin.files import parse_toml
 from rigtwin.importing.mapping import Column, Map, Source
@@ -53,13 +54,7 @@ def load(path: Path | Mapping[str, Any]) -> Map:
     """
     if isinstance(path, Mapping):
         return _map(path)
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise RigtwinError(f"cannot read {path}: {error.strerror}") from None
-    except ValueError as error:
-        raise RigtwinError(f"{path} is not valid TOML: {error}") from None
-    return replace(parse(text, str(path)), folder=path.parent)
+    return replace(read_toml(path, _map), folder=path.parent)
 
 
 def parse(text: str, name: str) -> Map:

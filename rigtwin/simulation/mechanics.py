@@ -35,7 +35,6 @@ class Handles(NamedTuple):
     structure: int  # Index of the structure plate's joint.
     load_cell: int  # Index of the load cell among the sensors.
     motor_constant: float  # Force per unit of voltage, N/V.
-    constraint: Array  # Forces of friction and contact, N.
     passive: Array  # Forces of springs and dampers, N.
     rail_friction: Array  # View of the rail's dry friction, N, shape (1,).
     motor_friction: Array  # View of the motor's dry friction, N, shape (1,).
@@ -116,7 +115,6 @@ def handles(model: mujoco.MjModel, data: mujoco.MjData) -> Handles:
         structure=int(model.joint("structure").qposadr[0]),
         load_cell=int(model.sensor("load_cell").adr[0]),
         motor_constant=float(model.actuator("motor").gainprm[0]),
-        constraint=data.qfrc_constraint,
         passive=data.qfrc_passive,
         rail_friction=model.dof_frictionloss[_single(model.joint("carriage").dofadr[0])],
         motor_friction=model.tendon_frictionloss[_single(model.tendon("motor").id)],
