@@ -39,7 +39,7 @@ ACCEPTED: Mapping[str, tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]]
     "eccentric": ((), (), ("gain", "eccentricity")),
     "ripple": (("cogging",), ("cogging",), ()),
     "hardening": (("stiffness", "cubic_stiffness", "position_force"), (), ()),
-    "sag": ((), ("gain", "saturation"), ()),
+    "sag": ((), ("gain", "saturation", "curvature"), ()),
     "late": ((), ("delay", "lag"), ("delay", "lag")),
     "lagging": ((), ("lag", "two_lags", "delay", "resonance"), ()),
     "soft limit": ((), ("rate_limit", "saturation", "lag", "two_lags"), ()),
