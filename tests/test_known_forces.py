@@ -148,3 +148,12 @@ def test_pushes_to_one_side_are_no_magnitudes(tmp_path: Path, is_push: bool):
     else:
         with pytest.raises(RigtwinError, match=r"no column is a measured force"):
             rigtwin.describe(tmp_path / "model.xml", log)
+
+
+def test_a_held_command_acts_half_a_row_late(tmp_path: Path):
+    (tmp_path / "model.xml").write_text(FURUTA)
+    places = {"arm_pos": np.sin(TIME), "rod_pos": 0.3 * np.sin(1.7 * TIME)}
+    log = write_log(tmp_path / "log.csv", {"t": TIME, **places, "motor_cmd_Nm": np.cos(TIME)})
+    machine = rigtwin.describe(tmp_path / "model.xml", log).machine
+    assert machine.plant.arm_force.delay == pytest.approx(-0.5 * PERIOD)
+    assert machine.plant.rod_force.delay == 0.0

@@ -104,6 +104,15 @@ def _tables(mechanism: Mechanism, reading: Reading) -> list[str]:
         for signal in reading.signals
         if signal.quantity is JointQuantity.FORCE and signal.formula
     ]
+    # Commands are held from row to row. About a row, the mean of the force is that of the held
+    # command before it and the one after it: it acts half a row later than it is recorded.
+    held = 0.5 * (reading.clock.resample or reading.clock.period)
+    tables += [
+        f"{sensor_name(mechanism, signal.joint, 'force')} = {{ delay = {-held!r} }}    "
+        "# half a row, as its command is held"
+        for signal in reading.signals
+        if signal.from_command and not signal.formula
+    ]
     # Only where the motion is given can a force follow a channel.
     if reading.kind.test == INVERSE:
         tables += [_schedule(schedule) for schedule in reading.schedules if schedule.joint]
