@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Annotated, NamedTuple
 
-from rigtwin.components.effect import Kind
+from rigtwin.components.effect import Context, Kind, Starts
 from rigtwin.components.quantity import MJCF, Quantity
 from rigtwin.components.starts import shares_of_nominal, shares_of_size
 
@@ -26,6 +27,21 @@ class Mass(NamedTuple):
     mass: Annotated[float, Quantity("kg", 0.0, 1e6, MJCF)] = 0.0
 
 
+LIGHTEST = 0.1
+"""Smallest mass, as a share of the nominal one. Forces that hardly show the inertia would be
+explained by a part that weighs nothing."""
+_GUESS = shares_of_size(
+    # F / a is the whole inertia that a measured force could move: a start without nominal.
+    lambda s: s.force / s.acceleration,
+    (0.7, 0.9, 0.97, 1.03, 1.1, 1.4),
+    0.005,
+)
+
+
+def _mass(context: Context) -> Starts:
+    return replace(_GUESS(context), bounds=((LIGHTEST * context.nominal, 1e6),))
+
+
 KINDS = (
     Kind(
         "mass",
@@ -34,10 +50,7 @@ KINDS = (
         "mass",
         {
             Carriage: shares_of_nominal((0.85, 0.95, 1.05, 1.15, 1.4), 0.005),
-            # F / a is the whole inertia that a measured force could move: a start without nominal.
-            Mass: shares_of_size(
-                lambda s: s.force / s.acceleration, (0.7, 0.9, 0.97, 1.03, 1.1, 1.4), 0.005
-            ),
+            Mass: _mass,
         },
     ),
 )

@@ -11,6 +11,8 @@ from rigtwin.components.scales import Scales
 
 LEAST_CHANGE = 1e-3
 """Smallest unit of the changes in a search, as a share of the nominal value."""
+LONGEST_LAG = 2.0
+"""Longest lag or delay of a force's reading, in characteristic times of the motion."""
 
 
 def fixed_starts(values: Sequence[float], step: float) -> Guess:
@@ -68,7 +70,13 @@ def late_starts(context: Context) -> Starts:
 
 
 def late_or_early_starts(context: Context) -> Starts:
-    """Return starts of either sign: a negative lag is a force that acts later than recorded."""
+    """Return starts of either sign: a negative lag is a force that acts later than recorded.
+
+    A lag that is much longer than the motion's own time leaves nothing of a signal. It would
+    explain any constant reading.
+    """
     late = late_starts(context)
     times = [time for (time,) in late.values]
-    return Starts.single([*(-time for time in times[:3]), *times], late.steps[0])
+    longest = LONGEST_LAG * context.scales.time
+    values = tuple((time,) for time in (*(-time for time in times[:3]), *times))
+    return Starts(values, late.steps, bounds=((-longest, longest),))

@@ -8,6 +8,8 @@ import pytest
 from rigtwin.components import (
     Carriage,
     Computer,
+    ForceSensor,
+    Mass,
     Motion,
     Motor,
     RigPlant,
@@ -19,6 +21,7 @@ from rigtwin.components import (
     with_parameters,
 )
 from rigtwin.components.effect import GROUPS, NAMES, Context
+from rigtwin.components.plant import plant_of
 from rigtwin.errors import RigtwinError
 
 PERIOD = 1e-3
@@ -95,3 +98,15 @@ def test_a_plant_with_another_value_keeps_all_others():
 def test_an_unknown_effect_is_refused_with_what_there_is(name, says):
     with pytest.raises(RigtwinError, match=says):
         find(name, RigPlant())
+
+
+def test_a_search_looks_for_no_weightless_part_and_no_endless_lag():
+    """Mass from a tenth of its nominal value on; a force's lag up to twice the motion's time."""
+    plant = plant_of({"cart": Mass(2.0), "cell": ForceSensor()})
+    sizes = Scales.of(Motion(POSITION, SPEED, SPEED), 1.0, PERIOD)
+    (lowest, _), *_ = find("mass@cart", plant).starts(plant, Swing(), lambda: sizes).bounds or ()
+    assert lowest == pytest.approx(0.2)
+    for kind in ("lag", "delay"):
+        starts = find(f"{kind}@cell", plant).starts(plant, Swing(), lambda: sizes)
+        assert starts.bounds == ((-2.0 * sizes.time, 2.0 * sizes.time),)
+        assert all(abs(time) < 2.0 * sizes.time for (time,) in starts.values)
