@@ -32,7 +32,7 @@ from rigtwin.describing.position_signals import ask_positions, position_signals
 from rigtwin.describing.quantity import JointQuantity
 from rigtwin.describing.question import Question, enumerate_names, option
 from rigtwin.describing.references import withdraw_references
-from rigtwin.describing.replay_kind import ReplayKind, choose_kind, free_swing
+from rigtwin.describing.replay_kind import ReplayKind, choose_kind, free_swing, passive_joints
 from rigtwin.describing.resting import note_resting
 from rigtwin.describing.schedule_signals import ScheduleColumn, schedule_columns
 from rigtwin.describing.servo_forces import come_from_servos
@@ -281,8 +281,8 @@ def _movers(
     """Forces or commands that the test needs, by joint."""
     movers: dict[str, LogSignal] = {}
     free = swinging(log.mechanism, list(positions)) if test == FORCES else []
-    driven = {joint for joint in positions if actuator_on(log.mechanism, joint) is not None}
-    passive = set(positions) - driven if driven else set()
+    passive = passive_joints(log.mechanism, list(positions))
+    passive = passive if passive < set(positions) else set()
     for joint, position in positions.items():
         mover: LogSignal | None = None
         if test == INVERSE:

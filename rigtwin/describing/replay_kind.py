@@ -127,15 +127,35 @@ def _kind_by_commands(
     return None
 
 
+def passive_joints(mechanism: Mechanism, joints: Sequence[str]) -> set[str]:
+    """Return the joints at which no force can act: no actuator pulls, and no equality ties them.
+
+    Parameters
+    ----------
+    mechanism
+        The compiled MJCF or URDF.
+    joints
+        Joints that the log describes.
+    """
+    acts_on = [mechanism.acts_on("actuator", name) for name in mechanism.names("actuator")]
+    # What pulls at a site or through a spatial tendon may pull at any joint.
+    if not all(acts_on):
+        return set()
+    pulled = {joint for along in acts_on for joint, _ in along}
+    tied = {joint for tie in mechanism.ties() for joint in (tie.joint, tie.to)}
+    return set(joints) - pulled - tied
+
+
 def _forces_are_known(mechanism: Mechanism, joints: Sequence[str]) -> bool:
     """Return whether the forces of actuators at joints are those at all joints of a model.
 
     No other joint moves, but for those that follow them, and no actuator pulls at several joints.
-    The force at a joint without an actuator is zero.
+    The force at a passive joint is zero.
     """
     followers = {tie.joint for tie in mechanism.ties_of(joints)[0]}
-    actuators = [name for joint in joints if (name := actuator_on(mechanism, joint)) is not None]
-    single = all(len(mechanism.acts_on("actuator", name)) == 1 for name in actuators)
+    driven = [joint for joint in joints if joint not in passive_joints(mechanism, joints)]
+    actuators = [actuator_on(mechanism, joint) for joint in driven]
+    single = all(name and len(mechanism.acts_on("actuator", name)) == 1 for name in actuators)
     return single and set(movable_joints(mechanism)) - followers <= set(joints)
 
 
