@@ -98,9 +98,8 @@ def _tables(mechanism: Mechanism, reading: Reading) -> list[str]:
         for joint in reading.idle
     ]
     tables += [
-        f"{sensor_name(mechanism, signal.joint, 'force')} = "
-        + ("{ effects = [] }" if signal.formula == "0" else '{ effects = ["lag", "delay"] }')
-        + "    # its factor was stated"
+        f"{sensor_name(mechanism, signal.joint, 'force')} = {{ effects = [] }}    "
+        "# its factor was stated"
         for signal in reading.signals
         if signal.quantity is JointQuantity.FORCE and signal.formula
     ]
