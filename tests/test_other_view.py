@@ -54,7 +54,10 @@ def test_cogging_that_no_simulation_follows_is_found_along_the_motion(tmp_path: 
     described = describe(tmp_path, follow(COGGING, 5))
     assert described.reading.kind.test == "force commands"
     answer = rigtwin.diagnose(tmp_path / "log.csv", machine=tmp_path / "axis.xml")
-    assert answer.verdict == "explained"
+    # Smoothing the motion takes a little of the cogging away, which may stand out of the noise.
+    assert answer.verdict in ("explained", "partly explained")
+    assert answer.gap is not None
+    assert answer.gap.shrinkage_held_out.value > 0.95
     (finding,) = answer.effects
     assert str(finding.name) == "cogging@axis"
     assert finding.parameters["cogging"].value == pytest.approx(COGGING, rel=0.05)

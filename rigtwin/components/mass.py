@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Annotated, NamedTuple
 
 from rigtwin.components.effect import Context, Kind, Starts
 from rigtwin.components.quantity import MJCF, Quantity
-from rigtwin.components.starts import shares_of_nominal, shares_of_size
+from rigtwin.components.starts import shares_of_nominal
 
 
 class Carriage(NamedTuple):
@@ -30,16 +29,15 @@ class Mass(NamedTuple):
 LIGHTEST = 0.1
 """Smallest mass, as a share of the nominal one. Forces that hardly show the inertia would be
 explained by a part that weighs nothing."""
-_GUESS = shares_of_size(
-    # F / a is the whole inertia that a measured force could move: a start without nominal.
-    lambda s: s.force / s.acceleration,
-    (0.7, 0.9, 0.97, 1.03, 1.1, 1.4),
-    0.005,
-)
 
 
 def _mass(context: Context) -> Starts:
-    return replace(_GUESS(context), bounds=((LIGHTEST * context.nominal, 1e6),))
+    unit = nominal = context.nominal
+    if nominal == 0.0:
+        # F / a is the whole inertia that a measured force could move.
+        unit = context.scales.force / context.scales.acceleration
+    values = tuple((share * unit,) for share in (0.7, 0.9, 0.97, 1.03, 1.1, 1.4))
+    return Starts(values, (0.005 * unit,), bounds=((LIGHTEST * nominal, 1e6),))
 
 
 KINDS = (

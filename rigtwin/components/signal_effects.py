@@ -22,10 +22,7 @@ from rigtwin.components.servo import Servo, VelocityServo
 from rigtwin.components.starts import at_limits, fixed_starts, late_or_early_starts, late_starts
 
 ACTS_LATE = "the force acts later than it is recorded, as that of an actuator behind its command"
-ECCENTRIC = Starts(
-    tuple(product((0.01, 0.04), (-2.0, 0.0, 2.0))),
-    (1e-3, 0.05),
-)
+ECCENTRIC = Starts(tuple(product((0.01, 0.04), (-2.0, 0.0, 2.0))), (1e-3, 0.05))
 """Starts of amplitude and phase of an error once a turn, rad."""
 BELOW = (0.95, 0.8, 0.65, 0.5, 0.35, 0.2, 0.1)
 """Starting values of a lower limit, as shares of the known limit."""
@@ -61,7 +58,7 @@ def _curvature(context: Context) -> Starts:
         for share in (0.5, 1.0)
         for command in sorted({max(size, 0.1 * full) for size in context.swing.largest})
     ]
-    # The largest command is where the start has it: its step is 0.
+    # A step of 0 keeps the largest command at the value of the start.
     return Starts(tuple(starts), (0.01, 0.004, 0.0))
 
 
@@ -127,7 +124,7 @@ KINDS = (
         "curvature",
         "quadratic share",
         ("curvature", "gain", "full_command"),
-        "a force of which this share grows with the square of the command, up to the largest one",
+        "a force of which this share, at the largest command, grows with the square of the command",
         {ForceActuator: _curvature},
         constants=("full_command",),
     ),

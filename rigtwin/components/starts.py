@@ -30,16 +30,6 @@ def shares_of_nominal(shares: Sequence[float], step: float) -> Guess:
     return guess
 
 
-def shares_of_size(size: Callable[[Scales], float], shares: Sequence[float], step: float) -> Guess:
-    """Return a guess of shares of the nominal value, or of the motion's size where that is zero."""
-
-    def guess(at: Context) -> Starts:
-        unit = at.nominal if at.nominal > 0.0 else size(at.scales)
-        return Starts.single([unit * share for share in shares], step * unit)
-
-    return guess
-
-
 def around_nominal(size: Callable[[Scales], float], shares: Sequence[float], step: float) -> Guess:
     """Return a guess of the nominal value plus shares of the motion's size, within bounds."""
 

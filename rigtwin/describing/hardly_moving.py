@@ -9,9 +9,9 @@ import numpy as np
 from rigtwin.describing.log import Log
 from rigtwin.numerics.arrays import Array
 
-LARGEST = {True: 0.05, False: 1e-3}
-"""Whether a joint turns → largest range of a joint that hardly moves, rad or m. Gears and bearings
-yield by about as much before they slip."""
+LARGEST_TURN, LARGEST_SLIDE = 0.05, 1e-3
+"""Largest range of a joint that hardly moves, rad and m. Gears and bearings yield by about as much
+before they slip."""
 SHARE = 0.03
 """Largest range of a joint that hardly moves, as a share of that of the joint that moves most."""
 
@@ -26,14 +26,13 @@ def joints_at_rest(log: Log, positions: Mapping[str, Array]) -> tuple[str, ...]:
     positions
         Joint → position, SI, shape (rows,).
     """
-    turns = {joint: log.mechanism.turns(joint) for joint in positions}
-    ranges = {joint: float(np.ptp(values)) for joint, values in positions.items()}
-    most = {
-        sort: max((ranges[joint] for joint in positions if turns[joint] is sort), default=0.0)
-        for sort in LARGEST
-    }
-    return tuple(
-        joint
-        for joint, sort in turns.items()
-        if ranges[joint] < min(LARGEST[sort], SHARE * most[sort])
-    )
+    resting: list[str] = []
+    for turns, largest in ((True, LARGEST_TURN), (False, LARGEST_SLIDE)):
+        ranges = {
+            joint: float(np.ptp(values))
+            for joint, values in positions.items()
+            if log.mechanism.turns(joint) == turns
+        }
+        least = min(largest, SHARE * max(ranges.values(), default=0.0))
+        resting += [joint for joint, width in ranges.items() if width < least]
+    return tuple(resting)

@@ -104,14 +104,13 @@ def _tables(mechanism: Mechanism, reading: Reading) -> list[str]:
         if signal.quantity is JointQuantity.FORCE and signal.formula
     ]
     # Commands are held from row to row. About a row, the mean of the force is that of the held
-    # command before it and the one after it: it acts half a row later than it is recorded. The
-    # motion of a single joint is smoothed otherwise, and showed a smaller shift.
-    held = 0.5 * (reading.clock.resample or reading.clock.period)
+    # command before it and the one after it: it acts half a row later than it is recorded.
+    half = 0.5 * (reading.clock.resample or reading.clock.period)
     tables += [
-        f"{sensor_name(mechanism, signal.joint, 'force')} = {{ delay = {-held!r} }}    "
-        "# half a row, as its command is held"
+        f"{sensor_name(mechanism, signal.joint, 'force')} = {{ delay = {-half!r} }}    "
+        "# s; half a row, as its command is held"
         for signal in reading.signals
-        if signal.from_command and not signal.formula and len(reading.joints) > 1
+        if signal.from_command and not signal.formula
     ]
     # Only where the motion is given can a force follow a channel.
     if reading.kind.test == INVERSE:
