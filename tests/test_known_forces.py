@@ -114,9 +114,9 @@ def test_the_force_at_a_joint_that_hardly_moves_is_not_judged(tmp_path: Path):
 @pytest.mark.parametrize(
     ("line", "said"),
     [
-        ('resting = "c"', "resting = c: expected a list of some joints"),
-        ('resting = ["a", "b", "c"]', "expected a list of some joints"),
-        ('resting = ["d"]', "expected a list of some joints"),
+        ('resting = "c"', "resting = c: expected a list of some of a, b, c, not all"),
+        ('resting = ["a", "b", "c"]', "expected a list of some of a, b, c, not all"),
+        ('resting = ["d"]', "expected a list of some of a, b, c, not all"),
     ],
 )
 def test_wrong_lists_of_resting_joints_are_refused(tmp_path: Path, line: str, said: str):

@@ -86,6 +86,16 @@ def test_whole_numbers_below_two_names_are_two_columns(tmp_path: Path):
     np.testing.assert_array_equal(columns.values["t_ms"], 4.0 * np.arange(40))
 
 
+def test_a_first_row_that_counts_is_data_below_names(tmp_path: Path):
+    path = tmp_path / "log.csv"
+    rows = [f"{0.004 * n:g},{1 + 0.1 * n:g},{2 - 0.2 * n:g}" for n in range(40)]
+    path.write_text("\n".join(["t,x,f", *rows]) + "\n")
+    columns = read_text(path)
+    assert rows[0] == "0,1,2"
+    assert list(columns.values) == ["t", "x", "f"]
+    assert len(columns.values["t"]) == 40
+
+
 def test_blank_lines_between_rows_are_skipped(tmp_path: Path):
     path = tmp_path / "log.csv"
     rows = [f"{0.004 * n:.3f},{0.1 * n:.2f},{-0.2 * n:.2f}" for n in range(300)]

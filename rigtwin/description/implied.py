@@ -148,7 +148,8 @@ def _expand_replay(
         return
     resting = table.get("resting", [])
     if not isinstance(resting, list) or not set(map(str, resting)) < set(joints):
-        mistakes.note(where, f"resting = {str(resting)[:40]}: expected a list of some joints")
+        expected = f"expected a list of some of {', '.join(joints)}, not all"
+        mistakes.note(where, f"resting = {str(resting)[:40]}: {expected}")
         return
     if resting and test != INVERSE:
         mistakes.note(where, f"resting: with test = {test!r} no forces are predicted")

@@ -216,28 +216,32 @@ def find_layout(lines: Sequence[str]) -> Layout | None:
             first = next((n for n in range(len(seen)) if _begins(seen, n)), None)
             if first is None:
                 continue
+            above = rows[first - 1] if first else ""
+            is_named = _names_columns(above, seen[first].cells, separator)
             # The more columns of numbers the better; commas that are decimals would else part them.
             numbers = seen[first].cells - 2 * len(seen[first].words)
             quality = (numbers, -SEPARATORS.index(separator))
             if (
                 separator == ","
                 and all("." not in line for line in rows[first : first + SURE])
-                and not (first and _names_columns(rows[first - 1], seen[first].cells))
+                and not is_named
                 # Numbers such as 1,5;2,5 split at commas give twice the columns; half of them is
                 # what another separator has to beat.
                 and numbers % 2 == 0
             ):
                 quality = (numbers // 2, -SEPARATORS.index(separator))
             if best is None or quality > best[0]:
-                begin = kept[first + _is_numbering(rows[first : first + 2], separator)]
+                # Below names, a row 0, 1, 2 is data.
+                is_numbering = not is_named and _is_numbering(rows[first : first + 2], separator)
+                begin = kept[first + is_numbering]
                 plain = Layout(separator, decimal, begin, (), (), seen[first].words)
                 best = quality, _read_header(lines, plain, seen[first].cells)
     return None if best is None else best[1]
 
 
-def _names_columns(line: str, columns: int) -> bool:
-    """Return whether a line has as many names as there are columns, separated by commas."""
-    cells = split_cells(line, ",")
+def _names_columns(line: str, columns: int, separator: str) -> bool:
+    """Return whether a line has as many names as there are columns."""
+    cells = split_cells(line, separator)
     return len(cells) == columns and all(any(map(str.isalpha, cell)) for cell in cells)
 
 
